@@ -1,4 +1,4 @@
-//! A small labelled data set, on disk and back: `cargo run --release --example dataset`.
+//! Writes a small labelled data set and reads it back: `cargo run --release --example dataset`.
 
 use std::path::Path;
 
@@ -11,7 +11,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "draw.\"sea.wind_speed\" = [3.0, 6.0]",
     ])?;
     let manifest = Manifest::new(recipe, 7, 12)?.with_val_share(0.25)?;
-    // PNG images, prompts, boxes for YOLO, COCO and DOTA; a second run continues where the first one stopped.
+    // Writes PNG images, prompts, and boxes for YOLO, COCO and DOTA; a second run continues where the first one
+    // stopped.
     let out = Path::new("out/dataset");
     write(out, &manifest, &manifest.source()?, 2, |progress| {
         println!("{} of {} images", progress.done, progress.total);

@@ -1,4 +1,4 @@
-//! Finds the wakes of an image file, or of a simulated image: `cargo run --release --example detect -- FILE`.
+//! Finds the wakes in an image file, or in a simulated image: `cargo run --release --example detect -- FILE`.
 
 use wake_detector::drawing::Drawing;
 use wake_detector::{Detector, GreyImage};

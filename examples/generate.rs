@@ -1,4 +1,4 @@
-//! A sentence becomes a labelled radar image with the diffusion model:
+//! Generates a labelled radar image from a sentence with the diffusion model:
 //! `cargo run --release --example generate -- "a ship at 8 m/s toward 135 degrees, wind 5 m/s"`.
 
 use std::path::Path;
@@ -11,7 +11,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let prompt = std::env::args().nth(1).unwrap_or_else(|| {
         "a ship at 10 m/s toward 120 degrees, wind 3 m/s toward 60 degrees".to_owned()
     });
-    // The weights lie in the crate.
+    // The weights are part of the crate.
     let sampler = WakeSampler::pretrained(&Device::default())?;
     let image = sampler.sample(&prompt, 7)?;
     println!("{}", wake_text::prompt(&image.scene)?);

@@ -1,4 +1,4 @@
-//! A source of your own feeds the loader: here a quarter of the images is open sea upside down.
+//! Feeds the loader from a source of your own: here a quarter of the images is open sea upside down.
 //! `cargo run --release --example own_source`.
 
 use std::ops::Range;
@@ -16,7 +16,7 @@ impl Source for Mirrored {
         self.0.size()
     }
 
-    /// A function of the position alone, so that a run may be stopped and continued on any number of threads.
+    /// Depends only on the position, so that a run can be stopped and continued with any number of threads.
     fn items(&self, positions: Range<u64>) -> Result<Vec<Pair>> {
         let mut pairs = self.0.items(positions)?;
         for Pair { image, .. } in &mut pairs {
@@ -31,7 +31,7 @@ fn main() -> std::result::Result<(), Box<dyn std::error::Error>> {
     let size = ["scene.grid.rows = 64", "scene.grid.columns = 64"];
     let ships = Recipe::default().with_assignments(&size)?;
     let sea = ships.with_assignments(&["draw.count = 0"])?;
-    // Three images with ships to one of open sea.
+    // Three images with ships for every image of open sea.
     let source = Mixture::new(vec![
         (3.0, Arc::new(Simulated::new(ships, 1)?)),
         (1.0, Arc::new(Mirrored(Simulated::new(sea, 2)?))),

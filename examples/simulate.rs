@@ -1,16 +1,16 @@
-//! A scene becomes a labelled radar image: `cargo run --release --no-default-features --example simulate`.
+//! Simulates a labelled radar image of a scene: `cargo run --release --no-default-features --example simulate`.
 
 use std::path::Path;
 
 use wake_physics::{Scene, Simulator};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    // Any keys of a scene file may be given, such as `ship.speed=8`.
+    // Arguments are keys of a scene file, such as `ship.speed=8`.
     let changes: Vec<String> = std::env::args().skip(1).collect();
     let scene = Scene::default()
         .with_assignments(&["sea.wind_speed=3"])?
         .with_assignments(&changes)?;
-    // A simulator keeps plans and memory for the next scene of the same size.
+    // A simulator reuses plans and memory for the next scene of the same size.
     let mut simulator = Simulator::default();
     let simulation = simulator.simulate(&scene)?;
     println!("{}", simulation.plan);

@@ -1,4 +1,5 @@
-//! Low-rank adaptations of a model in Stable Diffusion's layout, trained on simulated pairs and drawn with:
+//! Trains a low-rank adaptation of a model in Stable Diffusion's layout on simulated pairs, and generates an image with
+//! it:
 //! `cargo run --release --example stable_diffusion_lora -- stable-diffusion-v1-4` (default: a tiny model of the tests).
 
 use std::path::{Path, PathBuf};
@@ -39,7 +40,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     tuning.train(&tuned, &|_| ())?;
 
-    // The adaptations are a file of their own: any scale of them is added to the weights.
+    // The adaptation is a separate file, which is added to the weights at any scale.
     let adaptations = tuned.join("pytorch_lora_weights.safetensors");
     let pipeline = pipeline.with_lora(&adaptations, 0.8)?;
     let request = Request::new("a ship and its wake, radar image")

@@ -1,4 +1,4 @@
-//! The wake model as the data of a training loop of your own: a layer learns to light up where a wake begins.
+//! Uses the wake model as the data source of your own training loop: a layer learns to mark where a wake begins.
 //! `cargo run --release --example training_loop -- STEPS`.
 
 use wake_dataset::{Batch, Loader, Recipe, Simulated};
@@ -9,17 +9,18 @@ use wake_nn::burn::tensor::{Device, Tensor, TensorData};
 
 /// Rows and columns of the images.
 const SIZE: usize = 256;
-/// Images of a batch.
+/// Images per batch.
 const BATCH: usize = 4;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let steps: usize = std::env::args().nth(1).map_or(Ok(20), |n| n.parse())?;
-    // The model draws the images of the scenes; put the scenes themselves into the loader to simulate the images.
+    // The model draws the images of the scenes; to simulate the images instead, put the scenes into the loader
+    // directly.
     let scenes = Simulated::new(Recipe::default(), 1)?;
     let sampler = WakeSampler::pretrained(&Device::default())?;
     let source = Sampled::new(sampler, scenes)?;
     let device = Device::default().autodiff();
-    // Batch number n is always the same: `start(n)` continues a run.
+    // Batch number n is always the same, so `start(n)` continues a run.
     let loader = Loader::new(source).batch(BATCH).threads(2).start(0);
     let mut model: Conv2d = Conv2dConfig::new([1, 1], [5, 5]).init(&device);
     let mut optimizer = AdamWConfig::new().init();
@@ -36,7 +37,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// One where a wake begins, `[batch, 1, rows, columns]`.
+/// Target: one where a wake begins, zero elsewhere, `[batch, 1, rows, columns]`.
 fn tips(batch: &Batch, device: &Device) -> Tensor<4> {
     let mut tips = vec![0.0f32; BATCH * SIZE * SIZE];
     for (image, objects) in batch.objects.iter().enumerate() {

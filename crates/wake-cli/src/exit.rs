@@ -1,19 +1,20 @@
-//! How the program begins, speaks and ends.
+//! Start, output and exit codes of the program.
 
 use std::error::Error;
 use std::io::{self, ErrorKind, Write};
 use std::process::ExitCode;
 
-/// What a subcommand returns.
+/// Result of a subcommand.
 pub(crate) type Outcome<T> = Result<T, Box<dyn Error + Send + Sync>>;
 
-/// More threads than any machine has cores.
+/// Largest accepted number of threads, more than any machine has cores.
 const MOST_THREADS: usize = 1024;
-/// No sentence on standard error is longer.
+/// Longest message on standard error \[characters\].
 const LONGEST: usize = 2000;
 
-/// Runs a subcommand: exit code 0; or one sentence on standard error and exit code 2 for bad input (arguments, files that
-/// they name, folders that cannot be written to), 1 for any other failure (a full disk).
+/// Runs a subcommand. Returns exit code 0, or prints one sentence on standard error and returns 2 for bad input
+/// (arguments, files that they name, folders that cannot be written to) or 1 for any other failure (such as a full
+/// disk).
 pub(crate) fn code(work: impl FnOnce() -> Outcome<()>) -> ExitCode {
     match threads().map_err(Into::into).and_then(|()| work()) {
         Ok(()) => ExitCode::SUCCESS,
@@ -24,7 +25,8 @@ pub(crate) fn code(work: impl FnOnce() -> Outcome<()>) -> ExitCode {
     }
 }
 
-/// Whether an error of a crate is a failure: it wraps one in one of these variants, or is of another kind that always is one.
+/// Returns whether an error of a crate is a failure: it wraps one in one of these variants, or is of a kind that always
+/// is.
 macro_rules! is_failure_of {
     ($error:ident: $crate_error:ty, $($wraps:ident)|+ $(, always $kind:pat)?) => {
         if let Some(error) = $error.downcast_ref::<$crate_error>() {
@@ -38,7 +40,7 @@ macro_rules! is_failure_of {
     };
 }
 
-/// Whether an error has another cause than the input.
+/// Whether an error has a cause other than the input.
 fn is_failure(error: &(dyn Error + 'static)) -> bool {
     #[cfg(feature = "train")]
     is_failure_of!(error: wake_train::Error, Value | Model | Data | Detector | Scene, always E::Diverged { .. });
@@ -79,12 +81,12 @@ fn is_failure(error: &(dyn Error + 'static)) -> bool {
     }
 }
 
-/// Whether a file failed while it was written; a folder that cannot be written to was named wrongly.
+/// Whether a file failed while it was being written; a folder that cannot be written to counts as bad input.
 fn is_of_writing(action: &str) -> bool {
     matches!(action, "write" | "encode")
 }
 
-/// Prints a result. That its reader has left, as `head` does, is no error; that a disk is full is one.
+/// Prints a result. A closed pipe, as with `head`, is not an error; a full disk is.
 pub(crate) fn say(text: &str) -> io::Result<()> {
     let mut out = io::stdout().lock();
     match writeln!(out, "{text}").and_then(|()| out.flush()) {
@@ -96,7 +98,7 @@ pub(crate) fn say(text: &str) -> io::Result<()> {
     }
 }
 
-/// Says something on standard error, without the control characters of foreign text; if nobody can hear it, nobody does.
+/// Prints a message on standard error, with control characters escaped; failures to print are ignored.
 pub(crate) fn note(text: &str) {
     let harmless = text.chars().take(LONGEST).map(|c| match c {
         '\n' => "\n".to_owned(),
@@ -107,7 +109,7 @@ pub(crate) fn note(text: &str) {
     let _ = writeln!(io::stderr(), "{harmless}");
 }
 
-/// Refuses numbers of threads that no machine can start: rayon would try.
+/// Rejects numbers of threads that no machine can start, because rayon would try.
 fn threads() -> Result<(), String> {
     let name = "RAYON_NUM_THREADS";
     let Some(number) = std::env::var(name)

@@ -7,28 +7,28 @@ use wake_geo::{Located, Polarization, Product, locate};
 
 use crate::exit::{self, Outcome};
 
-/// Print where pixels of a product lie on Earth, and their calibration.
+/// Print the place on Earth and the calibration of pixels of a product.
 #[derive(Args)]
 #[command(after_help = "Rules of interpolation and calibration: docs/products.md")]
 pub(crate) struct Arguments {
-    /// Sentinel-1 GRD product (.SAFE folder or .zip) or GeoTIFF
+    /// Sentinel-1 GRD product (.SAFE folder or .zip), or GeoTIFF
     #[arg(value_name = "PRODUCT")]
     product: PathBuf,
-    /// Pixels, counted from 0
+    /// Pixels, as line and pixel counted from 0
     #[arg(required = true, value_name = "LINE,PIXEL", value_parser = pixel)]
     places: Vec<(usize, usize)>,
-    /// Compute σ⁰ of this digital number instead of the measurement's
+    /// Compute σ⁰ of this digital number instead of the measured one
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     dn: Option<f64>,
-    /// VV, HH, VH or HV, by default the first of these that the product has
+    /// Polarization: VV, HH, VH or HV [default: the first of these in the product]
     #[arg(long, value_parser = polarization)]
     polarization: Option<Polarization>,
-    /// Print one JSON object per line for each place, and nothing else
+    /// Print one JSON object per line for each pixel, and nothing else
     #[arg(long)]
     json: bool,
 }
 
-/// Prints the places in the order in which they are asked for; if one cannot be, none.
+/// Prints the places in the given order; prints nothing if one of them fails.
 pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     let path = &arguments.product;
     let product = match arguments.polarization {
@@ -46,7 +46,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     Ok(exit::say(&lines.join("\n"))?)
 }
 
-/// Reads `LINE,PIXEL`.
+/// Parses `LINE,PIXEL`.
 fn pixel(text: &str) -> Result<(usize, usize), String> {
     let number = |text: &str| text.trim().parse().ok();
     text.split_once(',')
@@ -54,7 +54,7 @@ fn pixel(text: &str) -> Result<(usize, usize), String> {
         .ok_or_else(|| "give two whole numbers from 0, such as 4512,9512".to_owned())
 }
 
-/// Reads the name of a polarization.
+/// Parses the name of a polarization.
 pub(crate) fn polarization(name: &str) -> Result<Polarization, String> {
     Polarization::from_name(name).ok_or_else(|| "give VV, HH, VH or HV".to_owned())
 }

@@ -1,4 +1,4 @@
-//! Recipes, numbers and networks as the command line names them.
+//! Parsers and loaders of recipes, numbers and networks named on the command line.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use wake_train::detector::ImageRecipe;
 use crate::exit::Outcome;
 
 #[cfg(feature = "train")]
-/// Reads the name of a recipe; `--help` tells what each shows.
+/// Parses the name of a recipe; `--help` describes each recipe.
 pub(crate) fn recipe() -> impl TypedValueParser<Value = ImageRecipe> {
     let names =
         ImageRecipe::ALL.map(|recipe| PossibleValue::new(recipe.name()).help(recipe.about()));
@@ -24,12 +24,12 @@ pub(crate) fn recipe() -> impl TypedValueParser<Value = ImageRecipe> {
     })
 }
 
-/// Reads the side of a pixel \[m\].
+/// Parses a pixel spacing \[m\].
 pub(crate) fn spacing(text: &str) -> Result<f32, String> {
     bounded(text, 0.5, 100.0, "m")
 }
 
-/// Reads a score.
+/// Parses a score.
 pub(crate) fn score(text: &str) -> Result<f32, String> {
     bounded(text, 0.0, 1.0, "probability")
 }
@@ -44,7 +44,7 @@ fn bounded(text: &str, low: f32, high: f32, unit: &str) -> Result<f32, String> {
     }
 }
 
-/// The network of a file, or the one that ships, which tells wakes from a score on.
+/// Loads the network of a file, or the shipped one, which detects wakes from a least score on.
 pub(crate) fn network(weights: Option<&Path>, device: &str, least_score: f32) -> Outcome<Detector> {
     let device = device_named(device)?;
     let detector = match weights {

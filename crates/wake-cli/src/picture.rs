@@ -1,4 +1,4 @@
-//! Pictures of results, written whole or not at all.
+//! Writes pictures of results atomically.
 
 use std::io::Cursor;
 use std::path::Path;

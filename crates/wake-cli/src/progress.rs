@@ -2,7 +2,7 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// A progress bar of so many `things`.
+/// Progress bar of `length` things.
 #[cfg(any(feature = "simulate", feature = "detect"))]
 pub(crate) fn bar(length: u64, things: &'static str) -> ProgressBar {
     let style = ProgressStyle::with_template("{bar:30} {pos}/{len} {msg}, {per_sec}, {eta} left");
@@ -11,7 +11,7 @@ pub(crate) fn bar(length: u64, things: &'static str) -> ProgressBar {
         .with_message(things)
 }
 
-/// A sign of life with the time gone by, for work that cannot say how far it is.
+/// Spinner with the elapsed time, for work whose progress is unknown.
 #[cfg(feature = "simulate")]
 pub(crate) fn clock(what: &'static str) -> ProgressBar {
     let style = ProgressStyle::with_template("{spinner} {msg}, {elapsed} gone by");

@@ -1,4 +1,4 @@
-//! `wake prompt`: a scene as a prompt and its 77 CLIP tokens; a prompt as the values it states, and what of it stays unread.
+//! `wake prompt`: turns a scene into a prompt and its 77 CLIP tokens, or reads the values of a prompt.
 
 use clap::Args;
 use serde_json::{Value, json};
@@ -8,21 +8,21 @@ use wake_text::{Reading, TOKENS, Tokenizer, Tokens};
 
 use crate::exit::{self, Outcome};
 
-/// Turn a scene into a prompt and its CLIP tokens, or read a prompt back.
+/// Turn a scene into a prompt and its CLIP tokens, or read a prompt.
 #[derive(Args)]
 #[command(after_help = "Scene keys with their units, ranges and defaults: docs/scene_keys.md")]
 pub(crate) struct Arguments {
-    /// Scene file (TOML); without it and without --text, the default scene
+    /// Scene file (TOML) [default: the default scene]
     #[arg(long, value_name = "FILE", conflicts_with = "text")]
     scene: Option<PathBuf>,
-    /// Prompt, instead of a scene
+    /// Prompt to read, instead of a scene
     #[arg(long, value_name = "TEXT")]
     text: Option<String>,
-    /// Change one value of the scene, such as ship.speed=12; may be repeated
+    /// Set one value of the scene, such as ship.speed=12; may be repeated
     #[arg(long, value_name = "KEY=VALUE", conflicts_with = "text")]
     set: Vec<String>,
-    /// Print one JSON object: prompt, ids, count, whether cut off, the stated values, the scene with them (null if
-    /// none is stated), and the unread parts of the prompt
+    /// Print one JSON object and nothing else: prompt, token ids and count, whether the prompt is truncated, stated
+    /// values, the scene with these values (null if none is stated), and unread parts of the prompt
     #[arg(long)]
     json: bool,
 }
@@ -34,7 +34,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
 
 fn answer(arguments: &Arguments) -> Outcome<String> {
     let (prompt, base) = match &arguments.text {
-        // A text has a ship only if it speaks of one.
+        // A text has a ship only if it mentions one.
         Some(text) => (
             text.clone(),
             Scene {
@@ -63,7 +63,7 @@ fn read_scene(arguments: &Arguments) -> wake_physics::Result<Scene> {
     scene.with_assignments(&arguments.set)
 }
 
-/// `scene` holds the stated values on top of `base`; it is null if nothing is stated.
+/// Result as JSON. `scene` holds the stated values on top of `base`; it is null if nothing is stated.
 fn as_json(prompt: &str, tokens: &Tokens, reading: &Reading, base: &Scene) -> Outcome<Value> {
     let scene = (!reading.states_nothing()).then(|| reading.scene.onto(base));
     let scene = scene.transpose()?;

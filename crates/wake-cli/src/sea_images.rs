@@ -1,4 +1,4 @@
-//! The images of a folder to learn a sea from, or to compare it with.
+//! Images in a folder, for learning a sea or for comparison with one.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -9,10 +9,10 @@ use wake_physics::Field;
 
 use crate::exit::Outcome;
 
-/// Endings of files that are read.
+/// File endings of images.
 const ENDINGS: [&str; 5] = ["png", "tif", "tiff", "jpg", "jpeg"];
 
-/// Which half of every image is looked at.
+/// Half of every image that is used.
 #[derive(clap::ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Half {
     Left,
@@ -20,7 +20,7 @@ pub(crate) enum Half {
 }
 
 impl Half {
-    /// Columns of a half, or of the whole.
+    /// Columns of a half, or of the whole image.
     fn columns(half: Option<Self>, columns: usize) -> Range<usize> {
         match half {
             None => 0..columns,
@@ -30,14 +30,14 @@ impl Half {
     }
 }
 
-/// An image and its mask, not read yet.
+/// Paths of an image and its mask, not read yet.
 pub(crate) struct SeaFile {
     pub(crate) path: PathBuf,
-    /// `NAME_mask.png` beside it, where there is one.
+    /// `NAME_mask.png` beside it, if there is one.
     pub(crate) mask: Option<PathBuf>,
 }
 
-/// The images of a folder by name, without the masks and the detector's pictures of wakes (`*.wakes.png`).
+/// Lists the images of a folder by name, without masks and the detector's pictures of wakes (`*.wakes.png`).
 pub(crate) fn list(folder: &Path) -> Outcome<Vec<SeaFile>> {
     let place = folder.display();
     let mut files = Vec::new();
@@ -66,7 +66,7 @@ pub(crate) fn list(folder: &Path) -> Outcome<Vec<SeaFile>> {
 }
 
 impl SeaFile {
-    /// Reads the image, or a half of it.
+    /// Reads the image, or half of it.
     pub(crate) fn read(&self, half: Option<Half>) -> Outcome<SeaImage> {
         let amplitude = field(&self.path, half)?;
         let mask = self.mask.as_ref().map(|mask| field(mask, half));

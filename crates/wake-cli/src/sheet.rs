@@ -1,4 +1,4 @@
-//! Pictures for people: an image with its labels drawn on it, captions, and sheets of several.
+//! Pictures for people: images with labels and captions, and sheets of several.
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
@@ -10,24 +10,24 @@ use wake_physics::{Error, output};
 /// Red, green, blue.
 pub(crate) type Colour = [u8; 3];
 
-/// Boxes of wakes.
+/// Colour of wake boxes.
 const WAKE: Colour = [255, 176, 0];
-/// Arms of wakes, and their tips.
+/// Colour of wake arms and tips.
 const ARMS: Colour = [64, 224, 128];
-/// Boxes of ships.
+/// Colour of ship boxes.
 const SHIP: Colour = [255, 96, 176];
-/// Behind captions and between the pictures of a sheet.
+/// Colour behind captions and between the pictures of a sheet.
 pub(crate) const PAPER: Colour = [24, 24, 24];
-/// Letters.
+/// Colour of letters.
 pub(crate) const INK: Colour = [240, 240, 240];
 
 /// Width of a letter \[pixels\].
 pub(crate) const LETTER: usize = get_raster_width(FontWeight::Regular, RasterHeight::Size16);
-/// From one line of letters to the next \[pixels\].
+/// Distance between lines of text \[pixels\].
 pub(crate) const LINE: usize = 18;
-/// Between the pictures of a sheet \[pixels\].
+/// Distance between the pictures of a sheet \[pixels\].
 const GAP: usize = 4;
-/// Pixels drawn and left out in turn, so that what lies under a line can be seen.
+/// Length of dashes and gaps \[pixels\], so that the image under a line stays visible.
 const DASH: usize = 5;
 
 /// A picture in colour.
@@ -39,8 +39,8 @@ pub(crate) struct Picture {
 }
 
 impl Picture {
-    /// A small grey picture of an image: each pixel is the mean of a square block, of as many pixels that neither side is longer
-    /// than `side`; what fills no block at the right and the bottom is left out.
+    /// Reduces a grey image by means over square blocks, the smallest that make neither side longer than `side`;
+    /// incomplete blocks at the right and bottom are dropped.
     ///
     /// - `levels`, `columns`: as in [`from_levels`](Self::from_levels)
     ///
@@ -103,7 +103,7 @@ impl Picture {
         [self.rows, self.columns]
     }
 
-    /// The colour at `[row, column]`.
+    /// Colour at `[row, column]`.
     ///
     /// # Panics
     ///
@@ -114,10 +114,10 @@ impl Picture {
         self.pixels[row * self.columns + column]
     }
 
-    /// Draws what labels say: the boxes of wakes and ships, the arms of wakes, their centrelines, and a cross at their
-    /// tips. What is drawn is cut to the picture.
+    /// Draws labels: boxes of wakes and ships, arms and centrelines of wakes, and a cross at each tip. Lines are
+    /// clipped to the picture.
     ///
-    /// Pixels of labels are those of the picture: draw before a caption is set above it.
+    /// Labels are in pixels of the picture, so draw them before adding a caption above it.
     pub(crate) fn draw_labels(&mut self, labels: &Labels) {
         for labelled in &labels.ships {
             let wake = &labelled.wake;
@@ -146,14 +146,14 @@ impl Picture {
         }
     }
 
-    /// Draws two short lines through a place.
+    /// Draws a small cross at a position.
     fn draw_cross(&mut self, [x, y]: Pixel, colour: Colour) {
         let arm = (DASH - 1) as f64;
         self.draw_line([[x - arm, y], [x + arm, y]], colour);
         self.draw_line([[x, y - arm], [x, y + arm]], colour);
     }
 
-    /// Draws a dashed line, cut to the picture; a line with an end that is not finite is not drawn.
+    /// Draws a dashed line, clipped to the picture; a line with an end that is not finite is skipped.
     fn draw_line(&mut self, line: [Pixel; 2], colour: Colour) {
         let Some([from, to]) = self.cut(line) else {
             return;
@@ -167,7 +167,7 @@ impl Picture {
         }
     }
 
-    /// The part of a line between the centres of the outermost pixels, after Liang and Barsky (1984).
+    /// Clips a line to the centres of the outermost pixels, after Liang and Barsky (1984).
     fn cut(&self, [from, to]: [Pixel; 2]) -> Option<[Pixel; 2]> {
         if self.pixels.is_empty() || !from.iter().chain(&to).all(|v| v.is_finite()) {
             return None;
@@ -190,7 +190,7 @@ impl Picture {
         (start <= end).then(|| [at(start), at(end)])
     }
 
-    /// The picture with lines of text above it, broken where they are too long; letters that the font lacks are blank.
+    /// Adds lines of text above the picture, wrapped to its width; letters that the font lacks are blank.
     pub(crate) fn captioned(mut self, text: &str) -> Self {
         let lines = broken(text, self.columns / LETTER);
         let above = lines.len() * LINE;
@@ -204,9 +204,9 @@ impl Picture {
         self
     }
 
-    /// Writes a line of text over the picture, cut at its right and lower side; letters that the font lacks are blank.
+    /// Writes a line of text over the picture, clipped at the right and bottom; letters that the font lacks are blank.
     ///
-    /// - `top`, `left`: of its first letter
+    /// - `top`, `left`: position of the first letter
     pub(crate) fn write_text(&mut self, text: &str, top: usize, left: usize) {
         for (n, letter) in text.chars().enumerate() {
             self.write_letter(letter, top, left + n * LETTER);
@@ -232,7 +232,7 @@ impl Picture {
         }
     }
 
-    /// Fills a rectangle, cut to the picture.
+    /// Fills a rectangle, clipped to the picture.
     #[cfg(any(feature = "bench", test))]
     pub(crate) fn fill(&mut self, [left, top, width, height]: [usize; 4], colour: Colour) {
         let right = (left + width).min(self.columns);
@@ -244,7 +244,7 @@ impl Picture {
         }
     }
 
-    /// Sets another picture over this one, cut at the right and lower side.
+    /// Pastes another picture over this one, clipped at the right and bottom.
     #[cfg(any(feature = "bench", test))]
     pub(crate) fn paste(&mut self, other: &Self, top: usize, left: usize) {
         let wide = other.columns.min(self.columns.saturating_sub(left));
@@ -254,7 +254,7 @@ impl Picture {
         }
     }
 
-    /// Draws a closed line through corners.
+    /// Draws a closed polygon.
     #[cfg(any(feature = "bench", test))]
     pub(crate) fn draw_outline(&mut self, corners: &[Pixel], colour: Colour) {
         for (n, &corner) in corners.iter().enumerate() {
@@ -262,7 +262,7 @@ impl Picture {
         }
     }
 
-    /// Pictures beside each other, `across` in a row; each begins at the upper left of its place.
+    /// Arranges pictures on a sheet, `across` in a row, each at the upper left of its cell.
     pub(crate) fn sheet(pictures: &[Self], across: usize) -> Self {
         let across = across.clamp(1, pictures.len().max(1));
         let largest = |side: fn(&Self) -> usize| pictures.iter().map(side).max().unwrap_or(0);
@@ -284,9 +284,9 @@ impl Picture {
         }
     }
 
-    /// Writes the picture as a PNG; one without colours as a grey one, which is smaller and sooner packed.
+    /// Writes the picture as PNG; a picture without colours as grey, which is smaller and faster to compress.
     ///
-    /// Mostly grey speckle: without filters the three equal bytes of a pixel compress to little more than one.
+    /// Pictures are mostly grey speckle: without filters the three equal bytes of a pixel compress to little more than one.
     ///
     /// # Errors
     ///
@@ -309,7 +309,7 @@ impl Picture {
     }
 }
 
-/// Words in lines of at most so many letters; a word that is longer is cut.
+/// Wraps words into lines of at most `letters` letters; longer words are cut.
 fn broken(text: &str, letters: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in text.split_whitespace() {
@@ -345,7 +345,7 @@ mod tests {
             .collect()
     }
 
-    /// Seven columns give three blocks of two, and one column that is left out.
+    /// Seven columns give three blocks of two, and one column is dropped.
     #[test]
     fn pixels_of_a_small_picture_are_means_of_blocks() {
         let levels: Vec<u8> = (0..4 * 7).map(|n| 10 * (n % 7) + n / 7).collect();
@@ -371,7 +371,7 @@ mod tests {
         let dashes = [0..5, 10..15, 20..25];
         let expected: Vec<usize> = dashes.into_iter().flatten().map(|j| 700 + j).collect();
         assert_eq!(row, expected);
-        // Past a corner, along a side outside, without an end, backwards through a corner.
+        // Past a corner, along a side outside, with an end that is not finite, backwards through a corner.
         let mut picture = grey(20, 30);
         picture.draw_line([[-10.0, 5.0], [5.0, -10.0]], SHIP);
         picture.draw_line([[0.0, -1.0], [29.0, -1.0]], SHIP);
@@ -384,7 +384,7 @@ mod tests {
         );
     }
 
-    /// A wake seen by its labels: box, arms and tip where the labels say, nothing else.
+    /// Box, arms and tip of a wake are drawn where the labels are, and nothing else is.
     #[test]
     fn labels_are_drawn_where_they_are() {
         let scene = Scene::default()
@@ -424,7 +424,7 @@ mod tests {
             ["a wake at", "45°, σ in", "dB"]
         );
         assert!((0..5).all(|i| (0..wide).all(|j| picture.at(3 * LINE + i, j) == [9; 3])));
-        // The bar of an L is at its left, and it is bright.
+        // The bar of an L is at its left and is bright.
         let letter = grey(1, LETTER).captioned("L");
         let places = (0..LINE).flat_map(|i| (0..LETTER).map(move |j| [i, j]));
         let bright = places.filter(|&[i, j]| letter.at(i, j)[0] > 140);

@@ -1,4 +1,4 @@
-//! `wake completions` and `wake man`: what a shell and a manual reader need of the command line.
+//! `wake completions` and `wake man`: shell completions and manual pages.
 
 use clap::{Args, Command};
 use clap_complete::Shell;
@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use crate::exit::{self, Outcome};
 
-/// Print the completions of a shell.
+/// Print the completion script of a shell.
 #[derive(Args)]
 #[command(
     after_help = "For bash: wake completions bash > ~/.local/share/bash-completion/completions/wake"
@@ -19,7 +19,7 @@ pub(crate) struct Completions {
 /// Write a manual page of each subcommand.
 #[derive(Args)]
 pub(crate) struct Man {
-    /// Folder of the pages, made if absent
+    /// Folder for the pages, created if absent
     #[arg(value_name = "DIR", default_value = "out/man")]
     out: PathBuf,
 }

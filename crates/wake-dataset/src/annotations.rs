@@ -1,4 +1,4 @@
-//! What a detector learns from: boxes of the labels, in COCO and in YOLO form.
+//! Training labels of a detector: boxes in COCO, YOLO and DOTA formats.
 
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
@@ -14,28 +14,28 @@ fn hundredths(value: f64) -> f64 {
     (100.0 * value).round() / 100.0
 }
 
-/// Boxes and their classes, as readers of image folders expect them.
+/// Boxes and their classes, in the form that readers of image folders expect.
 ///
-/// Labels count from the centre of the first pixel, boxes from its corner, half a pixel before. Steps of 0.01 pixels.
-/// A wake has a box only where it can be seen, a ship only where its echo is drawn: what cannot be seen cannot be found.
+/// Labels count from the centre of the first pixel, boxes from its corner, half a pixel before, in steps of 0.01 pixels.
+/// Only visible wakes and ships with an echo have a box, because nothing else can be detected.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Objects {
     /// (x, y, width, height) of each box \[pixels\].
     pub(super) bbox: Vec<Box2>,
-    /// Corners of the box along the track: port ahead, starboard ahead, starboard astern, port astern.
+    /// Corners of each box along the track: port ahead, starboard ahead, starboard astern, port astern.
     pub(super) oriented: Vec<Corners>,
-    /// Class of each: 0 wake, 1 ship.
+    /// Class of each box: 0 wake, 1 ship.
     pub(super) categories: Vec<u32>,
 }
 
 impl Objects {
-    /// What is seen of some labels.
+    /// Boxes of the visible objects of an image's labels.
     pub(super) fn of(labels: &Labels) -> Self {
         let mut objects = Self::default();
         for object in labels.objects() {
             let [x, y, w, h] = object.box_px;
             let bbox = [x + 0.5, y + 0.5, w, h].map(hundredths);
-            // A sliver at the edge may have no pixel's hundredth in the image.
+            // A sliver at the edge may be less than a hundredth of a pixel wide.
             if bbox[2] > 0.0 && bbox[3] > 0.0 {
                 objects.bbox.push(bbox);
                 let corners = object.oriented_box_px;
@@ -69,7 +69,7 @@ struct Image {
 
 #[derive(Serialize)]
 struct Annotation {
-    /// From 1: evaluation tools take 0 for "no match".
+    /// Counted from 1: evaluation tools read 0 as "no match".
     id: u64,
     image_id: u64,
     category_id: u32,
@@ -85,7 +85,7 @@ struct Category {
 }
 
 impl Coco {
-    /// The labels of some images, each with its number and its name, of `[rows, columns]` pixels.
+    /// Collects the labels of images of `[rows, columns]` pixels, each with its number and name.
     pub(super) fn of<'a>(
         images: impl Iterator<Item = (u64, &'a str, &'a Objects)>,
         [height, width]: [usize; 2],
@@ -122,7 +122,7 @@ impl Coco {
 
 // YOLO: `labels/NAME.txt` beside `images/NAME.png`, and `data.yaml`.
 
-/// The lines `class x y width height`, centre and size as shares of the image; empty without objects.
+/// Lines `class x y width height`, with centre and size as fractions of the image; empty without objects.
 pub(super) fn yolo(objects: &Objects, [rows, columns]: [usize; 2]) -> String {
     let (height, width) = (rows as f64, columns as f64);
     let mut text = String::new();
@@ -135,8 +135,8 @@ pub(super) fn yolo(objects: &Objects, [rows, columns]: [usize; 2]) -> String {
     text
 }
 
-/// The lines `class x1 y1 x2 y2 x3 y3 x4 y4` of oriented boxes for YOLO, as shares of the image. Its readers drop images
-/// with corners outside, so each of these moves to the nearest place in the image.
+/// Lines `class x1 y1 x2 y2 x3 y3 x4 y4` of oriented boxes for YOLO, as fractions of the image. YOLO readers drop images
+/// with corners outside, so such corners are moved to the nearest place in the image.
 pub(super) fn yolo_oriented(objects: &Objects, [rows, columns]: [usize; 2]) -> String {
     let mut text = String::new();
     for (class, corners) in objects.categories.iter().zip(&objects.oriented) {
@@ -150,7 +150,7 @@ pub(super) fn yolo_oriented(objects: &Objects, [rows, columns]: [usize; 2]) -> S
     text
 }
 
-/// The lines `x1 y1 x2 y2 x3 y3 x4 y4 class difficult` of oriented boxes as the data set DOTA has them, in pixels.
+/// Lines `x1 y1 x2 y2 x3 y3 x4 y4 class difficult` of oriented boxes in the format of the DOTA data set, in pixels.
 pub(super) fn dota(objects: &Objects) -> String {
     let mut text = String::new();
     for (&class, corners) in objects.categories.iter().zip(&objects.oriented) {
@@ -185,7 +185,7 @@ mod tests {
     use wake_physics::labels_of;
     use wake_physics::scene::{Grid, Scene};
 
-    /// 101 × 61 pixels of 20 m; a 200 m ship heads along azimuth from the middle.
+    /// 101 × 61 pixels of 20 m; a 200 m ship in the middle heads along azimuth.
     fn northward() -> Scene {
         let changes = ["ship.length=200", "ship.heading=0", "ship.speed=10"];
         let grid = Grid {
@@ -202,7 +202,7 @@ mod tests {
         .unwrap()
     }
 
-    /// Labels with a wake and a ship, as of an image of 101 × 61 pixels.
+    /// Labels with a wake and a ship, for an image of 101 × 61 pixels.
     fn drawn() -> Labels {
         let corners = [[29.35, 45.0], [30.65, 45.0], [30.65, 55.0], [29.35, 55.0]];
         Labels {
@@ -317,7 +317,7 @@ mod tests {
         );
     }
 
-    /// Boxes of any scene lie in the image, and its YOLO line is the same box.
+    /// The boxes of any scene lie in the image, and the YOLO lines describe the same boxes.
     #[test]
     fn boxes_lie_in_the_image() {
         let source = Simulated::new(Recipe::default(), 2).unwrap();
@@ -335,7 +335,7 @@ mod tests {
                     v[2] + v[4] / 2.0,
                 ];
                 for (a, b) in corners.iter().zip([*x, *y, x + w, y + h]) {
-                    // Six decimals of a share of 256, twice.
+                    // Six decimals of a fraction of 256, twice.
                     assert!((256.0 * a - b).abs() < 256.0 * 1e-6, "{line}");
                     assert!((0.5 - 0.01..=255.5 + 0.01).contains(&b), "{objects:?}");
                 }
@@ -343,7 +343,7 @@ mod tests {
                 wakes += usize::from(v[0] < 0.5);
             }
         }
-        // Four fifths have a ship; a wake is out of sight only where the ship has just left the image behind it.
+        // Four fifths have a ship; a wake has no box only where the ship is at the edge and the wake trails out of the image.
         assert!(wakes > 180, "{wakes}");
     }
 }

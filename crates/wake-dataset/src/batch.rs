@@ -1,4 +1,4 @@
-//! Pairs as tensors, batch by batch.
+//! Batches of pairs as tensors.
 //!
 //! ```
 //! use burn::tensor::Device;
@@ -23,23 +23,23 @@ use burn::tensor::{Device, Tensor, TensorData};
 use wake_physics::Scene;
 use wake_physics::labels::Object;
 
-/// Some images as one tensor, with what is in them.
+/// A batch of images as one tensor, with labels, scenes and prompts.
 #[derive(Debug, Clone)]
 pub struct Batch {
     /// Grey 0…1, `[batch, 1, rows, columns]`.
     pub images: Tensor<4>,
-    /// The upright boxes of all objects, `[objects, 6]`: the image's place in the batch, the class (0 wake, 1 ship), and
-    /// left, top, width and height \[pixels\].
+    /// Upright boxes of all objects, `[objects, 6]`: index of the image in the batch, class (0 wake, 1 ship), and left, top,
+    /// width and height \[pixels\].
     pub boxes: Tensor<2>,
     /// Labelled boxes of each image.
     pub objects: Vec<Vec<Object>>,
     /// The scene of each image.
     pub scenes: Vec<Scene>,
-    /// Each scene in words.
+    /// The prompt of each image.
     pub prompts: Vec<String>,
 }
 
-/// Makes a [`Batch`] of pairs of the same size; also for burn's own data loaders.
+/// Makes a [`Batch`] from pairs of the same size; also usable with burn's data loaders.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ToBatch;
 
@@ -82,11 +82,11 @@ fn boxes(objects: &[Vec<Object>]) -> TensorData {
 }
 
 impl<S: Source> Loader<S> {
-    /// Starts the threads; the tensors of the batches lie on `device`.
+    /// Starts the threads and returns batches with their tensors on `device`.
     ///
     /// # Errors
     ///
-    /// [`Error::Threads`](crate::Error::Threads) if the system gives no thread.
+    /// [`Error::Threads`](crate::Error::Threads) if a thread cannot be started.
     pub fn on(self, device: &Device) -> Result<Batches> {
         Ok(Batches {
             pairs: self.ordered()?,
@@ -95,7 +95,7 @@ impl<S: Source> Loader<S> {
     }
 }
 
-/// The batches of a [`Loader`], without end: each thread is up to four ahead.
+/// Endless batches of a [`Loader`]; up to four per thread are made ahead.
 #[derive(Debug)]
 pub struct Batches {
     pairs: Ordered<Vec<Pair>>,
@@ -196,10 +196,10 @@ mod tests {
         assert_eq!(objects, found);
     }
 
-    /// Row by row the box, the class and the image of every object.
+    /// Each row holds the image, class and box of one object.
     #[test]
     fn boxes_are_those_of_the_objects() {
-        // Large enough for wakes that are seen in two rows of windows.
+        // Large enough for a wake to be visible in two rows of windows.
         let sizes = [
             "scene.grid.rows = 64",
             "scene.grid.columns = 64",
@@ -229,7 +229,7 @@ mod tests {
         assert!(batch.boxes.dims()[0] > 2, "hardly any object");
     }
 
-    /// The same pairs through the data loader of burn, in its own order.
+    /// burn's data loader gives the same pairs, in its own order.
     #[test]
     fn burn_loads_them_too() {
         let loader = DataLoaderBuilder::new(ToBatch)
@@ -247,7 +247,7 @@ mod tests {
         assert_eq!(batches, expected);
     }
 
-    /// burn's shuffle gives every pair of the chosen length once, in an order of its seed.
+    /// burn's shuffle gives every pair of the given length once, in an order that depends on its seed.
     #[test]
     fn burn_shuffles_them() {
         let seeds = |shuffle: u64| -> Vec<u64> {

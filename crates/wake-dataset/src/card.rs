@@ -1,4 +1,4 @@
-//! The card of a data set: the page that a hub shows, with what programs read of it in front.
+//! Card of a data set: the page shown on a hub, with machine-readable metadata in front.
 
 use super::layout::{Layout, Manifest};
 use super::recipe::Draw;
@@ -7,16 +7,16 @@ use std::fmt::Write;
 use std::path::Path;
 use wake_physics::grey::Mapping;
 
-/// The form of the files beside a card.
+/// Format of the data set that a card describes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CardOf {
-    /// A folder that [`write`](crate::write()) made, with all images in one split.
+    /// A folder made by [`write`](crate::write()), with all images in one split.
     Folder,
-    /// Shards that [`write_webdataset`](crate::write_webdataset) made.
+    /// Shards made by [`write_webdataset`](crate::write_webdataset).
     WebDataset,
 }
 
-/// The columns of the table beside the images and their names, with their types by the names of Hugging Face.
+/// Columns of the table other than images and file names, with their Hugging Face types.
 const COLUMNS: [(&str, &str); 14] = [
     ("image_crc32", "string"),
     ("text", "string"),
@@ -34,13 +34,13 @@ const COLUMNS: [(&str, &str); 14] = [
     ("scene", "string"),
 ];
 
-/// Writes `README.md` into the folder of a data set, so that it can be uploaded as it is.
+/// Writes `README.md` into the folder of a data set, so that the folder can be uploaded as it is.
 ///
-/// - `license`: of the images, by its name on Hugging Face, such as `cc0-1.0`
+/// - `license`: licence of the images, by its name on Hugging Face, such as `cc0-1.0`
 ///
 /// # Errors
 ///
-/// [`Error::Dataset`](crate::Error::Dataset) for a folder without a data set, [`wake_nn::Error::Io`] where it cannot be written.
+/// [`wake_nn::Error::Io`] if the card cannot be written.
 pub fn write_card(folder: &Path, manifest: &Manifest, of: CardOf, license: &str) -> Result<()> {
     let text = card(manifest, of, license);
     whole_files::write_atomically(&Layout(folder).card(), text.as_bytes())?;
@@ -74,7 +74,7 @@ fn card(manifest: &Manifest, of: CardOf, license: &str) -> String {
         Mapping::Decibel => "decibel",
         Mapping::Amplitude => "amplitude",
     };
-    // Writing to a text cannot fail.
+    // Writing to a string cannot fail.
     let _ = write!(
         text,
         "\n# Ship wakes in simulated radar images\n\n\
@@ -108,7 +108,7 @@ fn card(manifest: &Manifest, of: CardOf, license: &str) -> String {
     text
 }
 
-/// What programs read: YAML between two lines of dashes.
+/// Machine-readable metadata: YAML between two lines of dashes.
 fn front(manifest: &Manifest, of: CardOf, license: &str) -> String {
     let size = match manifest.count {
         0..1_000 => "n<1K",
@@ -121,7 +121,7 @@ fn front(manifest: &Manifest, of: CardOf, license: &str) -> String {
         "---\nlicense: {license}\nlanguage:\n- en\npretty_name: Ship wakes in simulated radar images\ntask_categories:\n\
          - object-detection\n- text-to-image\ntags:\n- sar\n- radar\n- ship-wake\n- synthetic\nsize_categories:\n- {size}\n"
     );
-    // Of a folder only these: more of its files are texts than images, which `datasets` would take it for.
+    // Name a folder's files: it holds more texts than images, so `datasets` would take it for a set of texts.
     text += "configs:\n- config_name: default\n  data_files:\n  - split: train\n";
     text += match of {
         CardOf::Folder => "    path:\n    - images/*.png\n    - metadata.jsonl\n",
@@ -136,7 +136,7 @@ fn front(manifest: &Manifest, of: CardOf, license: &str) -> String {
     text
 }
 
-/// The columns of the table with their types, as `datasets` writes them.
+/// Columns of the table with their types, as `datasets` writes them.
 fn features(of: CardOf) -> String {
     let field = |(name, kind): (&str, &str)| format!("- name: {name}\n  dtype: {kind}\n");
     let mut row: String = COLUMNS.into_iter().map(field).collect();
@@ -170,7 +170,7 @@ mod tests {
     use super::*;
     use crate::Recipe;
 
-    /// Every key of a line of `metadata.jsonl` has a type in the card, and the card none that a line has not; counts are those of the set.
+    /// The card gives a type for exactly the keys of a line of `metadata.jsonl`, and states the counts of the set.
     #[test]
     fn a_card_names_every_column() {
         let recipe = Recipe::default().with_assignments(&["draw.quick_look.gain = 0.3"]);

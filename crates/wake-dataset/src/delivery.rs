@@ -1,4 +1,4 @@
-//! How an image is passed on: resized, and compressed as JPEG.
+//! Delivery of an image: resizing and JPEG compression.
 
 use super::grey::Grey;
 use crate::error::{Error, Result};
@@ -11,23 +11,23 @@ const BLOCK: usize = 8;
 /// Half-width of the cubic kernel \[pixels of the coarser image\].
 const REACH: f64 = 2.0;
 
-/// The step from the image of a product to an image that is passed on.
+/// Processing from the image of a product to the delivered image.
 ///
-/// The product is simulated with pixels of `resize` times the delivered size and more of them than the image needs. Its grey is
-/// interpolated at the centres of the delivered pixels (Catmull & Rom's cubic, widened where the image shrinks), compressed and
-/// cut. The origin is the same place in both images, so the labels of the delivered scene hold as they are.
+/// The product is simulated with pixels of `resize` times the delivered size and with a margin. Its grey levels are interpolated
+/// at the centres of the delivered pixels (Catmull & Rom's cubic, widened where the image shrinks), compressed and cut. The
+/// origin is the same place in both images, so the labels of the delivered scene hold unchanged.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Delivery {
-    /// Size of the product's pixels over the size of the delivered ones, 0.25 to 4.
+    /// Pixel size of the product over that of the delivered image, 0.25 to 4.
     pub resize: f64,
-    /// Quality of JPEG, 1 to 100; not compressed where absent.
+    /// JPEG quality, 1 to 100; `None` for no compression.
     pub quality: Option<u8>,
     /// Rows and columns from the border of a JPEG block to the first pixel, below 8.
     pub phase: [usize; 2],
 }
 
 impl Delivery {
-    /// The scene as the product has it.
+    /// The scene on the grid of the product.
     #[must_use]
     pub fn product(&self, delivered: &Scene) -> Scene {
         let mut scene = delivered.clone();
@@ -37,7 +37,7 @@ impl Delivery {
         scene
     }
 
-    /// Pixels along an axis of the product that carry `count` delivered pixels and the blocks around them.
+    /// Pixels along an axis of the product that cover `count` delivered pixels and the blocks around them.
     fn product_pixels(&self, count: usize) -> usize {
         let half = (count.div_ceil(2) + 2 * BLOCK) as f64 / self.resize;
         2 * (half + REACH * self.widening()).ceil() as usize + 2
@@ -48,9 +48,9 @@ impl Delivery {
         (1.0 / self.resize).max(1.0)
     }
 
-    /// The delivered image, in grey of 8 bits.
+    /// Resizes, compresses and cuts a product to the delivered image, with 8-bit grey levels.
     ///
-    /// - `product`: the grey of [`Self::product`]
+    /// - `product`: grey image of [`Self::product`]
     /// - `size`: rows and columns of the delivered scene
     ///
     /// # Errors
@@ -69,7 +69,7 @@ impl Delivery {
         Ok(Grey::of_levels(&cut, rows, columns))
     }
 
-    /// The product's grey at the delivered pixels, `padded` of them from the first block on.
+    /// The product's grey levels at `padded` delivered pixels from the first block.
     fn resized(&self, product: &Grey, size: [usize; 2], padded: [usize; 2]) -> Grey {
         let taps = |axis: usize, count: usize| -> Vec<Taps> {
             let first = (self.phase[axis] + size[axis] / 2) as f64;
@@ -100,16 +100,16 @@ impl Delivery {
     }
 }
 
-/// Weights of neighbouring pixels.
+/// Interpolation weights of neighbouring pixels.
 struct Taps {
     first: usize,
     weights: Vec<f32>,
 }
 
 impl Taps {
-    /// The cubic kernel around a place of a line of `count` pixels.
+    /// Weights of the cubic kernel around a place on a line of `count` pixels.
     ///
-    /// - `widening` of the kernel \[pixels\]
+    /// - `widening`: width of the kernel \[pixels\]
     fn at(place: f64, count: usize, widening: f64) -> Self {
         let last = count.saturating_sub(1) as f64;
         let [low, high] = [
@@ -127,14 +127,14 @@ impl Taps {
         }
     }
 
-    /// The weighted sum of values that are `step` apart.
+    /// Weighted sum of values that are `step` apart.
     fn of(&self, values: &[f32], step: usize) -> f32 {
         let values = values.iter().skip(self.first * step).step_by(step);
         self.weights.iter().zip(values).map(|(w, v)| w * v).sum()
     }
 }
 
-/// The interpolating cubic of Catmull & Rom (1974), equation of Keys (1981) with a = −½.
+/// Interpolating cubic of Catmull & Rom (1974), in the form of Keys (1981) with a = −½.
 fn cubic(x: f64) -> f64 {
     match x.abs() {
         x if x < 1.0 => (1.5 * x - 2.5) * x * x + 1.0,
@@ -143,7 +143,7 @@ fn cubic(x: f64) -> f64 {
     }
 }
 
-/// Levels of `[rows, columns]` pixels after JPEG.
+/// Levels of `[rows, columns]` pixels after JPEG compression.
 fn compressed(levels: &[u8], [rows, columns]: [usize; 2], quality: u8) -> Result<Vec<u8>> {
     let failed = |error| Error::Source(Box::new(error));
     let mut file = Vec::new();
@@ -167,7 +167,7 @@ mod tests {
         }
     }
 
-    /// The product of a scene with a grey that is a function of the place \[m\].
+    /// Product of a scene whose grey level is a function of the place \[m\].
     fn drawn(delivery: Delivery, scene: &Scene, grey: impl Fn(f64, f64) -> f64) -> Grey {
         let grid = delivery.product(scene).grid;
         let x = |j: usize| (j as f64 - (grid.columns / 2) as f64) * grid.spacing;
@@ -188,8 +188,8 @@ mod tests {
         Scene::default().with_assignments(&keys).unwrap()
     }
 
-    /// A plane of grey is the same plane at the places of the delivered pixels: cubic interpolation is exact for it, and a level
-    /// of 8 bits rounds by half of 1/255. So a place of the sea is delivered at the pixel that its label names.
+    /// A linear ramp of grey is the same ramp at the delivered pixels: cubic interpolation is exact for it, and 8 bits round by
+    /// half of 1/255. So each place is delivered at the pixel that its label gives.
     #[test]
     fn places_keep_their_labels() {
         let scene = scene();
@@ -209,7 +209,7 @@ mod tests {
         }
     }
 
-    /// Without resizing and compression the image is the product's own middle.
+    /// Without resizing and compression, the image is the middle of the product.
     #[test]
     fn nothing_to_do_changes_nothing() {
         let scene = scene();
@@ -225,7 +225,7 @@ mod tests {
         }
     }
 
-    /// Waves shorter than two delivered pixels are not aliased into an image that shrinks to a quarter.
+    /// Waves shorter than two delivered pixels are not aliased into an image that is reduced to a quarter.
     #[test]
     fn a_smaller_image_is_smoothed_first() {
         let scene = scene();
@@ -234,12 +234,12 @@ mod tests {
         let image = delivery
             .deliver(&drawn(delivery, &scene, wave), [40, 53])
             .unwrap();
-        // The widened kernel leaves 2 % of a wave of 0.62 delivered pixels; sampled alone it would keep its amplitude.
+        // The widened kernel leaves 2 % of a wave of 0.62 delivered pixels; sampling alone would keep its amplitude.
         assert!(image.pixels.iter().all(|grey| (grey - 0.5).abs() < 0.02));
     }
 
-    /// JPEG quantises each coefficient of a block: smooth grey survives a quality of 90 within two levels; at 10 it has steps where
-    /// the phase says that blocks end.
+    /// JPEG quantises the coefficients of each block: at quality 90, smooth grey changes by at most two levels; at 10, steps
+    /// appear at the block borders given by the phase.
     #[test]
     fn compression_has_blocks_at_the_phase() {
         let scene = scene();
@@ -258,7 +258,7 @@ mod tests {
             ..delivery
         };
         let image = low.deliver(&product, [40, 53]).unwrap();
-        // Steps from column to column: largest where a block ends, at columns 8 n − 6 of the image.
+        // Steps from column to column are largest at block borders, at columns 8 n − 6 of the image.
         let step = |j: usize| -> f32 {
             let row = |i: usize| (image.pixels[i * 53 + j] - image.pixels[i * 53 + j - 1]).abs();
             (0..40).map(row).sum()
@@ -272,7 +272,7 @@ mod tests {
         assert!(mean(2) > largest, "{} {largest}", mean(2));
     }
 
-    /// The kernel interpolates and its weights sum to 1 wherever it lies.
+    /// The kernel interpolates, and its weights sum to 1 at any position.
     #[test]
     fn the_kernel_is_a_partition_of_one() {
         for n in -1..=1 {

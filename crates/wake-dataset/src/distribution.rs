@@ -1,4 +1,4 @@
-//! How one value of a scene is drawn.
+//! Distributions of single values of a scene.
 
 use crate::error::{Error, Result};
 use serde::Serialize;
@@ -12,17 +12,17 @@ pub(super) enum Value {
     Word(String),
 }
 
-/// How one value is drawn.
+/// Distribution of one value.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub(super) enum Distribution {
-    /// Always the same.
+    /// A constant.
     Fixed(Value),
-    /// `[low, high]`: evenly between two numbers; of a whole number each equally often, the ends too.
+    /// `[low, high]`: uniform between two numbers; for whole numbers, each from `low` to `high` is equally likely.
     Even([f64; 2]),
-    /// `{ log = [low, high] }`: evenly in the logarithm.
+    /// `{ log = [low, high] }`: uniform in the logarithm.
     Logarithmic { log: [f64; 2] },
-    /// `{ one_of = [...], weights = [...] }`: one of several distributions, equally often without weights.
+    /// `{ one_of = [...], weights = [...] }`: one of several distributions, equally likely without weights.
     OneOf {
         one_of: Vec<Self>,
         #[serde(skip_serializing_if = "Option::is_none")]
@@ -31,7 +31,7 @@ pub(super) enum Distribution {
 }
 
 impl Distribution {
-    /// Whether a table of TOML is a distribution and not a table of further keys.
+    /// Whether a TOML table is a distribution, not a table of further keys.
     pub(super) fn is(table: &toml::Table) -> bool {
         table.contains_key("log") || table.contains_key("one_of")
     }
@@ -40,7 +40,7 @@ impl Distribution {
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::InvalidOption`] with the name, what stands there, and what may.
+    /// [`wake_nn::Error::InvalidOption`] with the name, the value and what is allowed.
     pub(super) fn parse(name: &str, value: &toml::Value) -> Result<Self> {
         match value {
             toml::Value::Boolean(flag) => Ok(Self::Fixed(Value::Flag(*flag))),
@@ -49,7 +49,7 @@ impl Distribution {
             toml::Value::Float(number) if number.is_finite() => {
                 Ok(Self::Fixed(Value::Number(*number)))
             }
-            // A manifest has no form for it.
+            // JSON, the format of the manifest, has no such numbers.
             toml::Value::Float(_) => Err(refused(
                 name,
                 value,
@@ -92,7 +92,7 @@ impl Distribution {
         })
     }
 
-    /// The value at a place 0…1 of the distribution.
+    /// Value at a quantile 0…1 of the distribution.
     ///
     /// - `whole`: whether the value is a whole number
     pub(super) fn at(&self, place: f64, whole: bool) -> Value {
@@ -117,7 +117,7 @@ impl Distribution {
         }
     }
 
-    /// The ends of all ranges, and all choices.
+    /// All ends of ranges, and all choices.
     pub(super) fn extremes(&self) -> Vec<Value> {
         match self {
             Self::Fixed(value) => vec![value.clone()],
@@ -129,11 +129,11 @@ impl Distribution {
     }
 }
 
-/// Which of `count` things lies at a place 0…1, and the place within it.
+/// Index of the weighted interval, of `count`, that holds a place 0…1, and the place within it.
 pub(super) fn choose(count: usize, weight: impl Fn(usize) -> f64, place: f64) -> (usize, f64) {
     let all: f64 = (0..count).map(&weight).sum();
     let mut left = place * all;
-    // What rounding leaves over is the last one's that has a weight.
+    // Rounding may pass the end: the last interval with a weight takes the rest.
     let last = (0..count).rfind(|&i| weight(i) > 0.0).unwrap_or(0);
     for i in 0..count {
         if left < weight(i) || i == last {
@@ -161,7 +161,7 @@ fn numbers(value: &toml::Value) -> Option<Vec<f64>> {
     value.as_array()?.iter().map(number).collect()
 }
 
-/// Two finite numbers, the lower first.
+/// Reads two finite numbers, the lower first.
 fn range(name: &str, value: &toml::Value) -> Result<[f64; 2]> {
     let numbers = numbers(value).and_then(|numbers| <[f64; 2]>::try_from(numbers).ok());
     let good = |[low, high]: &[f64; 2]| low.is_finite() && high.is_finite() && low <= high;
@@ -207,7 +207,7 @@ mod tests {
             at("{ one_of = [\"a\", \"b\"] }", 0.51),
             Value::Word("b".to_owned())
         );
-        // The place within a choice is its own: 0.4 to 1 is the range, whose middle is 0.7.
+        // Quantiles 0.4 to 1 belong to the range, whose middle is at 0.7.
         let nested = "{ one_of = [0, [10, 20]], weights = [2, 3] }";
         assert_eq!(at(nested, 0.39), Value::Number(0.0));
         assert_eq!(at(nested, 0.7), Value::Number(15.0));
@@ -217,7 +217,7 @@ mod tests {
         );
     }
 
-    /// Each whole number of 1 to 8 comes equally often: a thousand places an eighth.
+    /// Each whole number from 1 to 8 is equally likely: a thousand quantiles each.
     #[test]
     fn whole_numbers_are_equally_likely() {
         let looks = parsed("[1, 8]").unwrap();

@@ -1,9 +1,9 @@
-//! The one error of this crate.
+//! The error type of this crate.
 
 use std::path::PathBuf;
 use whole_files::sentence;
 
-/// Result of the functions of this crate.
+/// Result of a fallible function of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 /// A data set that could not be described, made, written or read.
@@ -11,11 +11,11 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[expect(missing_docs, reason = "the message names every field")]
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The recipe of a data set is not understood.
+    /// The recipe of a data set cannot be parsed, or its values cannot be combined.
     #[error("cannot read the recipe: {}", sentence(message))]
     Recipe { message: String },
 
-    /// A folder is no data set, or not the one it should be; line 0 is the file or folder as a whole.
+    /// A folder is not a data set, is damaged, or is another data set; line 0 stands for the whole file or folder.
     #[error("{}{}: {}", path.display(), if *line > 0 { format!(", line {line}") } else { String::new() }, sentence(message))]
     Dataset {
         path: PathBuf,
@@ -23,7 +23,7 @@ pub enum Error {
         message: String,
     },
 
-    /// The system gave no thread.
+    /// A thread could not be started.
     #[error("cannot start a thread: {source}; use fewer threads")]
     Threads { source: std::io::Error },
 
@@ -31,7 +31,7 @@ pub enum Error {
     #[error(transparent)]
     Value(#[from] wake_nn::Error),
 
-    /// A scene is not valid, or could not be simulated.
+    /// A scene is invalid or could not be simulated.
     #[error(transparent)]
     Scene(#[from] wake_physics::Error),
 
@@ -39,7 +39,7 @@ pub enum Error {
     #[error(transparent)]
     Text(#[from] wake_text::Error),
 
-    /// A source of images that is not of this crate failed.
+    /// A source of images outside this crate, or the JPEG codec, failed.
     #[error(transparent)]
     Source(Box<dyn std::error::Error + Send + Sync>),
 }
@@ -54,7 +54,7 @@ impl From<whole_files::Error> for Error {
 mod tests {
     use super::*;
 
-    /// Foreign text reaches a terminal in short lines without control characters.
+    /// Untrusted text reaches the terminal shortened and without control characters.
     #[test]
     fn foreign_text_is_escaped_and_cut() {
         let foreign = format!("\u{1b}[31m\0\u{7}\n{}", "x".repeat(100_000));

@@ -1,11 +1,11 @@
-//! Sources cut to a length, and folders, as data sets for burn's own loaders.
+//! Sources of a given length, and folders, as data sets for burn's loaders.
 
 use crate::folder::Folder;
 use crate::pair::Pair;
 use crate::source::Source;
 use burn::data::dataset::{Dataset, DatasetError};
 
-/// The first pairs of a source, as a data set of burn: for its `DataLoader`, and its way to shuffle.
+/// The first pairs of a source as a burn data set, for burn's `DataLoader` and shuffling.
 #[derive(Debug, Clone)]
 pub struct Finite<S> {
     /// The source.

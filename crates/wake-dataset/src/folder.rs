@@ -1,4 +1,4 @@
-//! A data set on disk, read back, once or again and again.
+//! Reading of a data set on disk, once or in endless epochs.
 
 use super::grey::Grey;
 use super::layout::{Layout, Manifest, broken};
@@ -12,22 +12,23 @@ use std::sync::{Arc, OnceLock};
 use wake_physics::labels::Labels;
 use wake_physics::{Scene, labels_of};
 
-/// A finite data set in a folder that [`write`](super::write) made.
+/// A finite data set in a folder made by [`write`](super::write).
 #[derive(Debug, Clone)]
 pub struct Folder {
     path: PathBuf,
     manifest: Manifest,
     rows: Rows,
-    /// Labels of the pairs that were read: they take longer than an image to read, and every epoch needs them.
+    /// Cached labels of the pairs read so far: computing them takes longer than reading an image.
     labels: Arc<[OnceLock<Labels>]>,
 }
 
 impl Folder {
-    /// Opens a folder; images are read when they are asked for.
+    /// Opens a folder; images are read on demand.
     ///
     /// # Errors
     ///
-    /// [`Error::Dataset`](crate::Error::Dataset) with the number of the first line that is broken or was changed.
+    /// [`Error::Dataset`](crate::Error::Dataset) if there is no finished data set, with the number of the first line that is
+    /// broken or was changed.
     pub fn open(path: &Path) -> Result<Self> {
         let Some(manifest) = Manifest::read(path)? else {
             let message = "no data set; make one with `wake dataset`";
@@ -67,18 +68,18 @@ impl Folder {
         self.rows.is_empty()
     }
 
-    /// The scenes that made the images, in order.
+    /// The scenes of the images, in order.
     pub fn scenes(&self) -> impl Iterator<Item = &Scene> {
         self.rows.iter().map(|(_, row)| &row.scene)
     }
 
-    /// Positions of the pairs that are to be learnt from, those that `trainset.txt` names.
+    /// Positions of the training pairs, which `trainset.txt` lists.
     #[must_use]
     pub fn trainset(&self) -> Vec<u64> {
         self.split(false)
     }
 
-    /// Positions of the pairs that are to be validated with, those that `valset.txt` names.
+    /// Positions of the validation pairs, which `valset.txt` lists.
     #[must_use]
     pub fn valset(&self) -> Vec<u64> {
         self.split(true)
@@ -103,7 +104,7 @@ impl Folder {
     ///
     /// # Errors
     ///
-    /// [`Error::Dataset`](crate::Error::Dataset) if there is no such pair, or its image is another one than was written.
+    /// [`Error::Dataset`](crate::Error::Dataset) if there is no such pair, or its image is not the one that was written.
     pub fn pair(&self, position: u64) -> Result<Pair> {
         let (index, row) = self.row(position)?;
         let labels = &self.labels[position as usize];
@@ -121,7 +122,7 @@ impl Folder {
     }
 }
 
-/// The image of a file's content.
+/// Decodes the content of an image file.
 fn decoded(path: &Path, bytes: &[u8], [rows, columns]: [usize; 2]) -> Result<Grey> {
     let image = image::load_from_memory_with_format(bytes, ImageFormat::Png);
     let image = image
@@ -138,9 +139,9 @@ fn decoded(path: &Path, bytes: &[u8], [rows, columns]: [usize; 2]) -> Result<Gre
     Ok(Grey::of_levels(image.as_raw(), rows, columns))
 }
 
-/// Every pair of a folder once in each epoch, shuffled anew, without end.
+/// Endless epochs of a folder: every pair once per epoch, reshuffled each time.
 ///
-/// Position p is pair p mod n of epoch p div n: a function of (seed, p) alone.
+/// Position p is item p mod n of the shuffled epoch p div n: a function of (seed, p) alone.
 #[derive(Debug, Clone)]
 pub struct Epochs {
     folder: Folder,
@@ -148,12 +149,12 @@ pub struct Epochs {
 }
 
 impl Epochs {
-    /// The endless walk through a folder.
+    /// Makes endless epochs of a folder, shuffled by a seed.
     pub fn new(folder: Folder, seed: u64) -> Self {
         Self { folder, seed }
     }
 
-    /// The folder that is walked through.
+    /// The folder.
     pub(super) fn folder(&self) -> &Folder {
         &self.folder
     }

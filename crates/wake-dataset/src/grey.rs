@@ -1,22 +1,22 @@
-//! Pictures in grey.
+//! Grey images.
 
 use wake_physics::Field;
 use wake_physics::grey::GreyScale;
 use wake_physics::measure::median;
 
-/// A picture in grey 0…1.
+/// An image with grey levels 0…1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grey {
     /// Number of rows.
     pub rows: usize,
     /// Number of columns.
     pub columns: usize,
-    /// The pixels `[rows, columns]`, row after row.
+    /// Pixels `[rows, columns]`, row by row.
     pub pixels: Vec<f32>,
 }
 
 impl Grey {
-    /// The grey of a field of σ⁰ or intensity.
+    /// Converts a field of σ⁰ or intensity to grey.
     pub(super) fn of_power(power: &Field, scale: &GreyScale) -> Self {
         let grey = |&p: &f32| scale.grey(f64::from(p)) as f32;
         Self {
@@ -26,14 +26,14 @@ impl Grey {
         }
     }
 
-    /// The grey of intensities as a quick-look shows them: amplitude stretched by an unknown factor, cut to 8 bits.
+    /// Converts intensities to a quick-look: amplitude stretched by an unknown factor, in 8 bits.
     ///
     /// ```text
     /// grey = offset + gain · a / median(a),   a = √intensity,   in steps of 1/255 from 0 to 1
     /// ```
     ///
-    /// Beside it the amplitudes of grey 0 and 1, a = median(a) (grey − offset)/gain. An image without power is of the grey of
-    /// `offset`, which no amplitude undoes.
+    /// Also returns the amplitudes of grey 0 and 1, a = median(a) (grey − offset)/gain; `None` if the median or the gain is zero.
+    /// An image with zero median has the grey level `offset` everywhere.
     pub fn quick_look(power: &Field, gain: f64, offset: f64) -> (Self, Option<[f64; 2]>) {
         let mut pixels: Vec<f32> = power.values.iter().map(|&p| p.max(0.0).sqrt()).collect();
         let median = median(&pixels);
@@ -55,13 +55,13 @@ impl Grey {
         (image, (median > 0.0 && gain > 0.0).then_some(ends))
     }
 
-    /// The pixels as the nearest levels of 8 bits.
+    /// Pixels rounded to 8-bit levels.
     pub fn levels(&self) -> Vec<u8> {
         let level = |&grey: &f32| (255.0 * grey).round() as u8;
         self.pixels.iter().map(level).collect()
     }
 
-    /// The picture of levels of 8 bits.
+    /// Makes an image from 8-bit levels.
     pub fn of_levels(levels: &[u8], rows: usize, columns: usize) -> Self {
         Self {
             rows,
@@ -83,8 +83,8 @@ mod tests {
         }
     }
 
-    /// The median amplitude has the grey of gain and offset, others are linear in amplitude, in steps of 8 bits, whatever
-    /// the unit of the intensity.
+    /// Whatever the unit of the intensity, the median amplitude has the grey level gain + offset, and grey is linear in
+    /// amplitude, in steps of 8 bits.
     #[test]
     fn a_quick_look_is_amplitude_of_an_unknown_factor() {
         let power = [0.0, 1.0, 4.0, 9.0, 1e6];
@@ -94,7 +94,7 @@ mod tests {
             let (grey, amplitudes) = Grey::quick_look(&field(&power), 0.2, 0.1);
             let [dark, bright] = amplitudes.unwrap();
             for (level, power) in grey.pixels.iter().zip(power).take(4) {
-                // Half a level of the 255 between the ends; the last pixel is cut.
+                // Half a level of the 255 between the ends; the last pixel is saturated.
                 let found = dark + f64::from(*level) * (bright - dark);
                 assert!((found - f64::from(power).sqrt()).abs() <= (bright - dark) / 509.0);
             }

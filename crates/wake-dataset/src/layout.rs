@@ -1,4 +1,4 @@
-//! Where the files of a data set lie, and what it says of itself.
+//! Files and manifest of a data set.
 
 use super::recipe::{Draw, Recipe};
 use super::scenes::{PAPER_SCENES, Simulated};
@@ -14,14 +14,14 @@ use wake_physics::Plan;
 use wake_physics::grey::GreyScale;
 use whole_files::{failed, read_text, sealed, unsealed};
 
-/// Version of the layout; a reader refuses others.
+/// Version of the layout; other versions are refused.
 const FORMAT: u32 = 5;
-/// Share of the images that are for validation, unless another is asked for.
+/// Default share of validation images.
 const VAL_SHARE: f64 = 0.1;
-/// Scenes that are planned to tell what a set costs.
+/// Number of scenes planned to estimate the cost of a set.
 const PLANNED: u64 = 8;
 
-/// Manifest of a data set: the content of `dataset.json`, from which every other file follows.
+/// Manifest of a data set: the content of `dataset.json`, which determines every other file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
@@ -31,25 +31,25 @@ pub struct Manifest {
     pub seed: u64,
     /// Number of pairs of the whole set.
     pub count: u64,
-    /// The mapping from σ⁰ to grey, that of the recipe.
+    /// Mapping from σ⁰ to grey, equal to the recipe's.
     pub grey: GreyScale,
-    /// Share of the images that are for validation, 0 to 1.
+    /// Share of validation images, 0 to 1.
     pub val_share: f64,
-    /// Which scenes.
+    /// Recipe of the scenes.
     pub recipe: Recipe,
-    /// [Fingerprint](whole_files::fingerprint) of the file of the learnt sea that the images show, if any.
+    /// [Fingerprint](whole_files::fingerprint) of the file of the learnt sea in the images, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sea: Option<String>,
-    /// Which share of the set this folder holds, if not all: the content of `shard.json`.
+    /// Shard of the set in this folder, if it is not the whole set: the content of `shard.json`.
     #[serde(skip)]
     pub shard: Option<Shard>,
 }
 
-/// Share `number` of `of` equal ones, counted from 0.
+/// Shard `number` of `of` nearly equal ones, counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Shard {
-    /// Number of the share, 0 up to `of`.
+    /// Index of the shard, from 0 to below `of`.
     pub number: u64,
     /// Number of shards.
     pub of: u64,
@@ -69,7 +69,7 @@ impl std::str::FromStr for Shard {
 }
 
 impl Manifest {
-    /// The whole set of `count` pairs of a recipe and a seed.
+    /// Makes the manifest of a whole set of `count` pairs from a recipe and a seed.
     ///
     /// # Errors
     ///
@@ -88,7 +88,7 @@ impl Manifest {
         })
     }
 
-    /// The same set with another share for validation.
+    /// Sets the share of validation images.
     ///
     /// # Errors
     ///
@@ -98,8 +98,8 @@ impl Manifest {
         Ok(Self { val_share, ..self })
     }
 
-    /// Whether image `index` is for validation: the share of all, chosen by the seed. The images of one scene of the
-    /// paper's grid, which differ in their seas alone, stay together.
+    /// Whether image `index` is for validation, chosen at random by the seed. Images of one scene of the paper's grid, which
+    /// differ only in their seas, stay on one side.
     pub(super) fn is_val(&self, index: u64) -> bool {
         let scenes = match self.recipe.draw {
             Draw::PaperGrid => self.count.min(PAPER_SCENES),
@@ -110,13 +110,13 @@ impl Manifest {
         shuffled(index % scenes, scenes, self.seed) < val
     }
 
-    /// Numbers of images to train with and to validate with, of this folder.
+    /// Numbers of training and validation images in this folder.
     pub(super) fn split_sizes(&self) -> [u64; 2] {
         let val = self.indices().filter(|&index| self.is_val(index)).count() as u64;
         [self.indices().end - self.indices().start - val, val]
     }
 
-    /// The pairs that it makes, without the learnt sea.
+    /// The source of the set's pairs, without the learnt sea.
     ///
     /// # Errors
     ///
@@ -125,7 +125,7 @@ impl Manifest {
         Simulated::new(self.recipe.clone(), self.seed)
     }
 
-    /// Estimated seconds of one core per image, by the plans of the first eight scenes.
+    /// Estimated core-seconds per image, from the plans of the first eight scenes.
     ///
     /// # Errors
     ///
@@ -140,7 +140,7 @@ impl Manifest {
         Ok(seconds / planned as f64)
     }
 
-    /// The indices of this folder: all, or one of nearly equal runs of neighbours.
+    /// Indices of the pairs in this folder: all, or a shard's contiguous range.
     pub fn indices(&self) -> Range<u64> {
         let Some(Shard { number, of }) = self.shard else {
             return 0..self.count;
@@ -149,7 +149,7 @@ impl Manifest {
         end(number)..end(number + 1)
     }
 
-    /// The content of `dataset.json`, the same for a set and all its shards.
+    /// Content of `dataset.json`, the same for a set and all its shards.
     pub(super) fn text(&self) -> Result<String> {
         let text = serde_json::to_string_pretty(self);
         let text = text.map_err(|e| failed("encode", Path::new("dataset.json"), e))?;
@@ -160,7 +160,7 @@ impl Manifest {
     ///
     /// # Errors
     ///
-    /// [`Error::Dataset`] if it is not the manifest of this layout, or was changed after it was written.
+    /// [`Error::Dataset`] if it is not a manifest of this layout, or was changed after it was written.
     pub(super) fn read(folder: &Path) -> Result<Option<Self>> {
         let path = Layout(folder).manifest();
         let Some(text) = text_if_there(&path)? else {
@@ -184,7 +184,7 @@ impl Manifest {
     }
 }
 
-/// Why a text without a valid checksum is no manifest: no JSON, of another version, of something else, or changed.
+/// Error for a text without a valid checksum: not JSON, another version, not a manifest, or changed.
 fn unreadable_manifest(path: &Path, text: &str) -> Error {
     let value: serde_json::Value = match parse_json(path, text) {
         Ok(value) => value,
@@ -219,7 +219,7 @@ fn parse_json<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T> {
     serde_json::from_str(text).map_err(|e| broken(path, e.line(), e.to_string()))
 }
 
-/// Paths of a data set in a folder.
+/// Paths of the files of a data set in a folder.
 #[derive(Clone, Copy)]
 pub(super) struct Layout<'a>(pub(super) &'a Path);
 
@@ -248,18 +248,18 @@ impl Layout<'_> {
         self.0.join("data.yaml")
     }
 
-    /// Folders of the images and of their labels: YOLO, YOLO with oriented boxes, DOTA.
+    /// Folders of images and labels: images, YOLO, YOLO with oriented boxes, DOTA.
     pub(super) fn folders(self) -> [PathBuf; 4] {
         ["images", "labels", "labels-obb", "labelTxt"].map(|name| self.0.join(name))
     }
 
-    /// The lists of images to train with, and to validate with. A name that has `train` or `val` as a word of its own would be
-    /// taken for the whole split by Hugging Face `datasets`, which then finds no image in it.
+    /// Lists of training and validation images. The names must not contain `train` or `val` as separate words: Hugging Face
+    /// `datasets` would take such a file for the whole split, and find no image in it.
     pub(super) fn lists(self) -> [PathBuf; 2] {
         ["trainset.txt", "valset.txt"].map(|name| self.0.join(name))
     }
 
-    /// The image of one pair and its labels, as in [`Self::folders`].
+    /// Image and label files of one pair, in the order of [`Self::folders`].
     pub(super) fn files_of(self, index: u64) -> [PathBuf; 4] {
         let [_, labels @ ..] = self.folders();
         let [upright, oriented, dota] = labels.map(|folder| folder.join(format!("{index:06}.txt")));
@@ -271,7 +271,7 @@ impl Layout<'_> {
     }
 }
 
-/// `file_name` of a pair.
+/// The `file_name` of a pair.
 pub(super) fn image_name(index: u64) -> String {
     format!("images/{index:06}.png")
 }

@@ -9,7 +9,7 @@ pub mod streams;
 mod delivery;
 mod grey;
 
-// Which scenes.
+// Choice of scenes.
 mod distribution;
 mod draws;
 mod recipe;
@@ -35,7 +35,7 @@ mod webdataset;
 
 mod merge;
 
-// Pairs, position by position.
+// Sources of pairs by position.
 mod source;
 
 mod mixture;

@@ -1,14 +1,14 @@
-//! Pairs batch by batch, made on other threads.
+//! Batches of pairs, made on other threads.
 
 use super::ordered::Ordered;
 use super::pair::Pair;
 use super::source::Source;
 use crate::error::Result;
 
-/// Makes the batches of a source on other threads, in order: `Loader::new(source).batch(16).threads(4).on(&device)`.
+/// Makes batches of a source on other threads, in order: `Loader::new(source).batch(16).threads(4).on(&device)`.
 ///
-/// Step s holds the pairs at s·b up to (s + 1)·b, the same ones whatever the number of threads and wherever the first
-/// step is.
+/// With batches of b pairs, step s holds the pairs from s·b to below (s + 1)·b, whatever the number of threads and the first
+/// step.
 #[derive(Debug)]
 pub struct Loader<S> {
     source: S,
@@ -18,7 +18,7 @@ pub struct Loader<S> {
 }
 
 impl<S: Source> Loader<S> {
-    /// Batches of 16 from the first pair on, made on one thread.
+    /// Batches of 16 from the first pair, made on one thread.
     pub fn new(source: S) -> Self {
         Self {
             source,
@@ -28,7 +28,7 @@ impl<S: Source> Loader<S> {
         }
     }
 
-    /// Pairs of a batch, at least one.
+    /// Sets the number of pairs per batch, at least one.
     #[must_use]
     pub fn batch(self, batch: usize) -> Self {
         Self {
@@ -37,13 +37,13 @@ impl<S: Source> Loader<S> {
         }
     }
 
-    /// Threads that make batches, each at a batch of its own.
+    /// Sets the number of threads; each makes a batch of its own.
     #[must_use]
     pub fn threads(self, threads: usize) -> Self {
         Self { threads, ..self }
     }
 
-    /// The first step: how many batches an interrupted run has seen.
+    /// Sets the first step: the number of batches that an interrupted run has used.
     #[must_use]
     pub fn start(self, step: u64) -> Self {
         Self {
@@ -52,11 +52,11 @@ impl<S: Source> Loader<S> {
         }
     }
 
-    /// Starts the threads; each batch comes as its pairs, without end, for loops that make their own tensors.
+    /// Starts the threads and returns endless batches of pairs, for training loops that make their own tensors.
     ///
     /// # Errors
     ///
-    /// As [`on`](Self::on); each batch those of [`Source::items`].
+    /// As [`on`](Self::on); for each batch, the errors of [`Source::items`].
     pub fn pairs(self) -> Result<impl Iterator<Item = Result<Vec<Pair>>>> {
         self.ordered()
     }
@@ -75,7 +75,7 @@ mod tests {
     use super::*;
     use crate::{Recipe, Simulated};
 
-    /// Whatever the number of threads, a batch holds the pairs of its step.
+    /// A batch holds the pairs of its step, whatever the number of threads.
     #[test]
     fn pairs_come_in_order_from_any_step() {
         let size = ["scene.grid.rows = 16", "scene.grid.columns = 16"];

@@ -7,18 +7,18 @@ use crate::error::Result;
 use std::path::{Path, PathBuf};
 use whole_files::{entries, failed, read_text};
 
-/// Folder of a shard below that of its set.
+/// Folder of a shard, below the folder of its set.
 pub fn shard_folder(folder: &Path, shard: Shard) -> PathBuf {
     Layout(folder).shard(shard)
 }
 
-/// Joins the shards `shard-0`, `shard-1`, … of a folder into one set in the folder itself, byte for byte the one that
-/// would have been made without shards, and removes them. A merge that is killed can be started again.
+/// Joins the shards `shard-0`, `shard-1`, … of a folder into one set in that folder, byte for byte the set made without
+/// shards, and removes the shards. A merge that was killed can be restarted.
 ///
 /// # Errors
 ///
-/// [`Error::Dataset`](crate::Error::Dataset) if a shard is missing, unfinished, damaged or of another set; nothing is
-/// changed then.
+/// [`Error::Dataset`](crate::Error::Dataset) if a shard is missing, unfinished, damaged or of another set; then nothing is
+/// changed.
 pub fn merge(folder: &Path) -> Result<Manifest> {
     if let Some(whole) = merged_before(folder)? {
         remove_shards(folder)?;
@@ -45,7 +45,7 @@ pub fn merge(folder: &Path) -> Result<Manifest> {
     Ok(whole)
 }
 
-/// The set that an earlier merge finished but for removing the shards.
+/// The set of an earlier merge that finished, except perhaps for removing the shards.
 fn merged_before(folder: &Path) -> Result<Option<Manifest>> {
     let Some(whole) = Manifest::read(folder)? else {
         return Ok(None);
@@ -57,12 +57,12 @@ fn merged_before(folder: &Path) -> Result<Option<Manifest>> {
     Ok((finished && whole.shard.is_none()).then_some(whole))
 }
 
-/// The content of a `dataset.json`.
+/// Content of `dataset.json`.
 fn manifest_text(folder: &Path) -> Result<String> {
     Ok(read_text(&Layout(folder).manifest())?)
 }
 
-/// Folder and manifest of every shard, in order; at least one.
+/// Folders and manifests of all shards, in order; at least one.
 fn shards(folder: &Path) -> Result<Vec<(PathBuf, Manifest)>> {
     let first = shard_at(folder, 0)?;
     let of = first.1.shard.map_or(1, |shard| shard.of);
@@ -95,7 +95,7 @@ fn shard_at(folder: &Path, number: u64) -> Result<(PathBuf, Manifest)> {
     }
 }
 
-/// The lines of a shard and their rows, all of them, with every file here or already moved, and as it was written.
+/// Lines and rows of a finished shard, after checking that every file is here or already moved, and unchanged.
 fn finished_rows(folder: &Path, path: &Path, manifest: &Manifest) -> Result<(Vec<u8>, Rows)> {
     let metadata = Layout(path).metadata();
     let text = whole_files::read_bytes(&metadata)?;
@@ -135,7 +135,7 @@ fn move_files(folder: &Path, path: &Path, manifest: &Manifest) -> Result<()> {
     Ok(())
 }
 
-/// Removes what is left of the shards of a set, and nothing else.
+/// Removes the remains of a set's shards, and nothing else.
 fn remove_shards(folder: &Path) -> Result<()> {
     let text = manifest_text(folder)?;
     for path in entries(folder)? {
@@ -151,7 +151,7 @@ fn remove_shards(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Removes a shard without images: only files that a shard has.
+/// Removes a shard without images, deleting only files that belong to a shard.
 fn remove(path: &Path) -> Result<()> {
     let layout = Layout(path);
     let gone = |result: std::io::Result<()>| match result {

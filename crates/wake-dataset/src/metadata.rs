@@ -1,4 +1,4 @@
-//! `metadata.jsonl`: one line a pair, in order; it grows as pairs are made.
+//! `metadata.jsonl`: one line per pair, in order, appended as pairs are made.
 
 use super::annotations::{Objects, dota, yolo, yolo_oriented};
 use super::layout::{Layout, Manifest, broken, image_name};
@@ -15,7 +15,7 @@ use whole_files::{checksum, failed, sealed, unsealed};
 /// One pair as a line of `metadata.jsonl`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Row {
-    /// Path of the image, below the folder.
+    /// Path of the image, relative to the folder.
     pub(super) file_name: String,
     /// [Checksum](checksum) of the image's file.
     image_crc32: String,
@@ -23,21 +23,21 @@ pub(super) struct Row {
     pub(super) text: String,
     #[serde(flatten)]
     columns: Columns,
-    /// The scene that made the image, as JSON in a string: its keys hold words in one scene and numbers in another, which
-    /// the columns of a table cannot.
+    /// The scene of the image, as JSON in a string: some of its keys hold words in one scene and numbers in another, which
+    /// columns of a table cannot.
     #[serde(with = "in_a_string")]
     pub(super) scene: Scene,
-    /// What is where.
+    /// Labelled boxes.
     pub(super) objects: Objects,
-    /// Amplitudes of grey 0 and 1, of a quick-look.
+    /// Amplitudes of grey 0 and 1, for a quick-look.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) amplitudes: Option<[f64; 2]>,
 }
 
 impl Row {
-    /// The line of a pair.
+    /// Makes the row of a pair.
     ///
-    /// - `image_crc32`: [checksum] of its image's file
+    /// - `image_crc32`: [checksum] of the image file
     pub(super) fn of(pair: &Pair, image_crc32: String) -> Self {
         Self {
             file_name: image_name(pair.index),
@@ -50,7 +50,7 @@ impl Row {
         }
     }
 
-    /// The content of the image's file.
+    /// Reads the image file and checks its checksum.
     ///
     /// - `line`: number of this row in `metadata.jsonl`, from 1
     ///
@@ -71,7 +71,7 @@ impl Row {
         Err(broken(path, 0, message))
     }
 
-    /// The contents of the label files of an image of `[rows, columns]` pixels, in the order of [`Layout::files_of`].
+    /// Contents of the label files of an image of `[rows, columns]` pixels, in the order of [`Layout::files_of`].
     pub(super) fn labels(&self, size: [usize; 2]) -> [String; 3] {
         let objects = &self.objects;
         [
@@ -81,13 +81,13 @@ impl Row {
         ]
     }
 
-    /// Checks that image and labels are those that were written with this row.
+    /// Checks that the image and label files are the ones that were written with this row.
     ///
-    /// - `files`: as [`Layout::files_of`] names them; all of them are there
+    /// - `files`: as given by [`Layout::files_of`]; all must exist
     ///
     /// # Errors
     ///
-    /// [`Error::Dataset`](crate::Error::Dataset) with the first file that is not.
+    /// [`Error::Dataset`](crate::Error::Dataset) for the first file that differs.
     pub(super) fn check_files(
         &self,
         [image, labels @ ..]: &[PathBuf; 4],
@@ -108,7 +108,7 @@ impl Row {
     }
 }
 
-/// A scene as JSON in a string.
+/// Serialization of a scene as JSON in a string.
 mod in_a_string {
     use serde::de::{Deserialize, Deserializer, Error as _};
     use serde::ser::{Error as _, Serializer};
@@ -123,10 +123,10 @@ mod in_a_string {
     }
 }
 
-/// The values of a scene that a data set varies, a column of its table each, so that other readers need not know scenes.
+/// Main values of a scene as columns of the table, so that readers need not parse scenes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Columns {
-    /// Whether there is a ship; without one the values of the ship are `None`, of several they are the first one's.
+    /// Whether there is a ship. The ship's values are `None` without a ship, and belong to the first of several.
     ship: bool,
     ship_speed: Option<f64>,
     ship_heading: Option<f64>,
@@ -159,24 +159,24 @@ impl Columns {
     }
 }
 
-/// The rows of a folder with their indices, in order.
+/// Rows of a folder with their indices, in order.
 pub(super) type Rows = Vec<(u64, Row)>;
 
 /// The growing `metadata.jsonl` of a folder.
 pub(super) struct Log {
     path: PathBuf,
     file: File,
-    /// Bytes up to the end of the last whole line.
+    /// Bytes up to the end of the last complete line.
     length: u64,
     pub(super) rows: Rows,
 }
 
 impl Log {
-    /// Opens the log of a folder, cuts off a line that a killed run left unfinished, and checks all others.
+    /// Opens the log of a folder, cuts off an incomplete line left by a killed run, and checks all others.
     ///
     /// # Errors
     ///
-    /// [`Error::Dataset`](crate::Error::Dataset) with the number of the first line that the set does not have.
+    /// [`Error::Dataset`](crate::Error::Dataset) with the number of the first line that does not belong to the set.
     pub(super) fn open(folder: &Path, manifest: &Manifest) -> Result<Self> {
         let path = Layout(folder).metadata();
         let fail = |e| failed("open", &path, e);
@@ -198,7 +198,7 @@ impl Log {
         })
     }
 
-    /// Adds a line; if it cannot be written whole, not a part of it stays.
+    /// Appends a line; if writing fails, no part of the line remains.
     pub(super) fn push(&mut self, index: u64, row: Row) -> Result<()> {
         let line = line(&row)?;
         if let Err(e) = self.file.write_all(line.as_bytes()) {
@@ -211,7 +211,7 @@ impl Log {
         Ok(())
     }
 
-    /// Waits until all of it is on disk.
+    /// Waits until all lines are on disk, and returns the rows.
     pub(super) fn finish(self) -> Result<Rows> {
         let synced = self.file.sync_all();
         synced.map_err(|e| failed("write", &self.path, e))?;
@@ -219,14 +219,14 @@ impl Log {
     }
 }
 
-/// A row as its line.
+/// Line of a row.
 pub(super) fn line(row: &Row) -> Result<String> {
     let text = serde_json::to_string(row);
     let text = text.map_err(|e| failed("encode", Path::new(&row.file_name), e))?;
     Ok(sealed(&text) + "\n")
 }
 
-/// The rows of whole lines, each with its checksum and of its own pair.
+/// Parses complete lines, checking the checksum and the pair of each.
 pub(super) fn parse(path: &Path, text: &[u8], manifest: &Manifest) -> Result<Rows> {
     let lines = text.split_inclusive(|&b| b == b'\n').enumerate();
     let mut indices = manifest.indices();
@@ -255,7 +255,7 @@ pub(super) fn parse(path: &Path, text: &[u8], manifest: &Manifest) -> Result<Row
     lines.map(parse).collect()
 }
 
-/// Checks that the lines are those that this set makes, byte for byte but for what only the images tell: their checksums, and
+/// Checks that the lines belong to this set, byte for byte except for values that depend on the images: their checksums and
 /// the amplitudes of quick-looks.
 fn check(path: &Path, text: &[u8], rows: &Rows, manifest: &Manifest) -> Result<()> {
     let source = manifest.source()?;

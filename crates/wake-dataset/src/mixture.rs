@@ -1,4 +1,4 @@
-//! Several sources as one.
+//! Weighted mixture of sources.
 
 use super::pair::Pair;
 use super::source::Source;
@@ -6,13 +6,13 @@ use crate::error::{Error, Result};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Weights in parts of this: exact for every position that fits in 64 bits.
+/// Denominator of the weights, which makes counts exact for every 64-bit position.
 const WHOLE: u128 = 1 << 32;
 
-/// Sources in turn, each as often as its weight says.
+/// Interleaves several sources in proportion to their weights.
 ///
-/// Of the first p positions source k has its weight's share ± 1, evenly spread, so that every batch has its share of each. A source is
-/// asked for its own positions 0, 1, 2, …: a folder is walked without gaps, and a batch asks each source once.
+/// Source k has its share of the first p positions, to within 1 for two sources and 2 for a few more, so that every batch
+/// contains each source in proportion. Each source is read at its own positions 0, 1, 2, … without gaps, and once per batch.
 ///
 /// ```text
 /// n(p) = ⌊w p⌋       positions before p that are the first source's; p is its own if n(p + 1) > n(p)
@@ -20,17 +20,17 @@ const WHOLE: u128 = 1 << 32;
 /// ```
 #[derive(Debug, Clone)]
 pub struct Mixture {
-    /// Sources with their weight among themselves and all that follow [parts of `WHOLE`].
+    /// Sources, each with its weight relative to itself and all later sources [parts of `WHOLE`].
     parts: Vec<(u128, Arc<dyn Source>)>,
 }
 
 impl Mixture {
-    /// A mixture of sources with their weights, which need not add up to one.
+    /// Makes a mixture of sources with weights, which need not sum to one.
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::InvalidOption`] for no source, for a weight that is no positive number, and for sources whose images
-    /// differ in size.
+    /// [`wake_nn::Error::InvalidOption`] without sources, for a weight that is not a positive finite number, and for images of
+    /// different sizes.
     pub fn new(sources: Vec<(f64, Arc<dyn Source>)>) -> Result<Self> {
         let refused = |option: &str, value: String, expected: String| {
             Err(Error::Value(wake_nn::Error::InvalidOption {
@@ -71,7 +71,7 @@ impl Mixture {
         })
     }
 
-    /// Number of the source of a position, and its position there.
+    /// Index of the source of a position, and the position within that source.
     fn place(&self, position: u64) -> (usize, u64) {
         let mut position = position;
         for (k, &(share, _)) in self.parts.iter().enumerate() {
@@ -81,12 +81,12 @@ impl Mixture {
             }
             position -= before;
         }
-        // The last share is the whole.
+        // Unreachable: the last share is the whole.
         (self.parts.len() - 1, position)
     }
 }
 
-/// Positions before one that belong to a share.
+/// Number of positions before a given one that belong to a share.
 fn before(position: u64, share: u128) -> u64 {
     (u128::from(position) * share / WHOLE) as u64
 }
@@ -127,7 +127,7 @@ mod tests {
     use wake_physics::Scene;
     use wake_physics::labels::Labels;
 
-    /// Pairs that say who made them: the prompt names the source, the index is its own position.
+    /// Source of pairs whose prompt names the source and whose index is the position in it.
     #[derive(Debug)]
     struct Named(&'static str, [usize; 2]);
 
@@ -162,7 +162,7 @@ mod tests {
         pairs.into_iter().map(|p| (p.prompt, p.index)).collect()
     }
 
-    /// Each source is asked for 0, 1, 2, …, and after p positions it had its share to within one: a floor of a floor.
+    /// Each source is read at 0, 1, 2, …, and after p positions it has had its share to within two, from nested floors.
     #[test]
     fn every_source_has_its_share_without_gaps() {
         for weights in [&[1.0][..], &[3.0, 1.0], &[0.2, 0.5, 0.3], &[1e-3, 1.0, 7.0]] {

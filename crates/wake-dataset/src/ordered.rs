@@ -1,4 +1,4 @@
-//! Work on other threads, results in order.
+//! Parallel work with results in order.
 
 use crate::error::{Error, Result};
 use rayon::ThreadPoolBuilder;
@@ -8,25 +8,25 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
-/// Items a thread that are worked on or ready before they are asked for.
+/// Number of items per thread that are computed ahead.
 const READY: u64 = 4;
 
-/// An item, and where its result goes.
+/// An item, and the channel for its result.
 type Job<T> = (u64, Sender<Result<T>>);
 
 type Queue<T> = Arc<Mutex<Receiver<Job<T>>>>;
 
-/// The results of `work` on some items, in the order of the items, computed ahead on other threads.
+/// Results of `work` on items, in the order of the items, computed ahead on other threads.
 ///
-/// A thread that is free takes the next item, so that one slow item holds up no other thread until [`READY`] items a
-/// thread are waiting behind it. Each thread works in a pool of one thread, so that n of them use n cores.
+/// A free thread takes the next item, so a slow item blocks no other thread until [`READY`] items per thread wait behind
+/// it. Each thread works in a rayon pool of one thread, so n threads use n cores.
 pub(super) struct Ordered<T> {
     items: Box<dyn Iterator<Item = u64> + Send>,
-    /// To the threads; `None` once nobody asks any more.
+    /// Sender to the threads; `None` once no more results are wanted.
     jobs: Option<Sender<Job<T>>>,
-    /// Items that no thread has taken.
+    /// Items not yet taken by a thread.
     queue: Queue<T>,
-    /// Results to come, in order.
+    /// Pending results, in order.
     results: VecDeque<Receiver<Result<T>>>,
     threads: Vec<JoinHandle<()>>,
 }
@@ -45,7 +45,7 @@ impl<T: Send + 'static> Ordered<T> {
     ///
     /// # Errors
     ///
-    /// [`Error::Threads`] if the system gives no thread.
+    /// [`Error::Threads`] if a thread cannot be started.
     pub(super) fn new(
         items: impl Iterator<Item = u64> + Send + 'static,
         threads: usize,
@@ -70,7 +70,7 @@ impl<T: Send + 'static> Ordered<T> {
                 .name(format!("simulate-{k}"))
                 .spawn(move || {
                     while let Some((item, result)) = next_job(&queue) {
-                        // A result that nobody waits for is dropped.
+                        // Sending fails if the result is no longer wanted.
                         let _ = result.send(pool.install(|| work(item)));
                     }
                 })
@@ -81,7 +81,7 @@ impl<T: Send + 'static> Ordered<T> {
         Ok(ordered)
     }
 
-    /// Hands out items until enough are on their way.
+    /// Sends items to the threads until enough are pending.
     fn work_ahead(&mut self) {
         let ahead = READY as usize * self.threads.len();
         while let Some(jobs) = &self.jobs
@@ -90,13 +90,13 @@ impl<T: Send + 'static> Ordered<T> {
         {
             let (sender, result) = channel();
             self.results.push_back(result);
-            // Without a thread that listens, the receiver finds out.
+            // If no thread listens, receiving the result fails.
             let _ = jobs.send((item, sender));
         }
     }
 }
 
-/// The next item; `None` when there will be no other.
+/// Waits for the next item; `None` once there are no more.
 fn next_job<T>(queue: &Queue<T>) -> Option<Job<T>> {
     let queue = queue.lock().unwrap_or_else(PoisonError::into_inner);
     queue.recv().ok()
@@ -107,7 +107,7 @@ fn no_thread(source: std::io::Error) -> Error {
 }
 
 impl<T> Ordered<T> {
-    /// Lets every thread finish what it is at, without another item; the panic of one that panicked.
+    /// Lets every thread finish its current item, drops all others, and returns the panic of a thread, if any.
     fn stop(&mut self) -> std::thread::Result<()> {
         self.results.clear();
         self.jobs = None;
@@ -139,7 +139,7 @@ impl<T: Send + 'static> Iterator for Ordered<T> {
 
 impl<T> Drop for Ordered<T> {
     fn drop(&mut self) {
-        // A panic was meant for `next`; nobody asks any more.
+        // Panics are passed on by `next` alone.
         drop(self.stop());
     }
 }
@@ -163,7 +163,7 @@ mod tests {
         assert_eq!(Ordered::new(0..0, 3, Ok).unwrap().count(), 0);
     }
 
-    /// While one thread is at item 0, the other makes the even items too: 6 ends the wait.
+    /// While one thread waits at item 0, the other makes all further items: item 6 ends the wait.
     #[test]
     fn a_slow_item_holds_up_no_other_thread() {
         let (made, sixth) = channel();
@@ -216,7 +216,7 @@ mod tests {
         }
     }
 
-    /// Nobody works ahead further than the queues hold, nor after the results are dropped.
+    /// Work stays within the bounds of the queues, and ends when the results are dropped.
     #[test]
     fn queues_are_bounded() {
         let count = Arc::new(AtomicU64::new(0));
@@ -232,7 +232,7 @@ mod tests {
         );
         std::thread::sleep(Duration::from_millis(20));
         drop(endless);
-        // Ten taken, and those that were on their way.
+        // Ten taken, and the pending ones.
         assert!(count.load(Ordering::Relaxed) <= 10 + 2 * READY);
     }
 }

@@ -1,4 +1,4 @@
-//! One image with its words, numbers and labels.
+//! One image with its prompt, scene and labels.
 
 use super::grey::Grey;
 use super::scenes::Simulated;
@@ -7,24 +7,24 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use wake_physics::labels::Labels;
 use wake_physics::{Field, Scene, Simulator, labels_of};
 
-/// An image with its prompt, the scene it was made from, and its labels.
+/// An image with its prompt, scene and labels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pair {
-    /// Its number in the data set.
+    /// Index in the data set.
     pub index: u64,
-    /// The image, in the grey of its recipe, or as the quick-look that the recipe draws.
+    /// The image, in grey levels by the recipe's mapping or as a quick-look.
     pub image: Grey,
-    /// The scene in words.
+    /// The scene as a sentence.
     pub prompt: String,
-    /// The scene that was drawn.
+    /// The scene from which the image was made.
     pub scene: Scene,
     /// Places of ships and wakes.
     pub labels: Labels,
-    /// Of a quick-look: the amplitudes √σ⁰ of grey 0 and of grey 1, linear between; the first may be below 0.
+    /// For a quick-look, the amplitudes √σ⁰ of grey 0 and grey 1, linear between; the first may be negative.
     pub amplitudes: Option<[f64; 2]>,
 }
 
-/// Simulators that wait for the next pair, each with its memory; no more than ever worked at once.
+/// Idle simulators with their memory, kept for the next pair; at most as many as have worked at once.
 fn idle() -> MutexGuard<'static, Vec<Simulator>> {
     static IDLE: Mutex<Vec<Simulator>> = Mutex::new(Vec::new());
     IDLE.lock().unwrap_or_else(PoisonError::into_inner)
@@ -35,7 +35,7 @@ impl Simulated {
     ///
     /// # Errors
     ///
-    /// [`Error::Scene`](crate::Error::Scene) if the grid does not fit in memory; as [`Sea::image`] where another sea is drawn.
+    /// [`Error::Scene`](crate::Error::Scene) if the grid does not fit in memory; the errors of [`Sea::image`] with another sea.
     ///
     /// [`Sea::image`]: crate::Sea::image
     pub fn pair(&self, index: u64) -> Result<Pair> {
@@ -56,7 +56,7 @@ impl Simulated {
         })
     }
 
-    /// Intensities of a scene as its recipe asks for them.
+    /// Intensities of a scene, with or without speckle as the recipe states, or on another sea.
     fn power(&self, scene: &Scene) -> Result<Field> {
         if let Some(sea) = self.sea() {
             return sea.image(scene);
@@ -72,8 +72,8 @@ impl Simulated {
         })
     }
 
-    /// The intensities of image number `index` as its recipe shows them, and the amplitudes at the ends of a quick-look's
-    /// grey.
+    /// Converts the intensities of image number `index` to grey by the recipe; also returns a quick-look's amplitudes of grey 0
+    /// and 1.
     pub fn grey(&self, power: &Field, index: u64) -> (Grey, Option<[f64; 2]>) {
         match self.quick_look(index) {
             Some([gain, offset]) => Grey::quick_look(power, gain, offset),
@@ -81,7 +81,7 @@ impl Simulated {
         }
     }
 
-    /// Pair number `index` with an image of no pixels: quick, for it is not simulated.
+    /// Makes pair number `index` with an empty image, without simulation.
     ///
     /// # Errors
     ///
@@ -108,8 +108,8 @@ mod tests {
     use super::*;
     use crate::Recipe;
 
-    /// In a delivered image the echo of a ship at rest is brightest where its label says: within half the ship and a resolution cell of
-    /// two pixels. The image has the size of its scene, and is another than the product's.
+    /// In a delivered image, the echo of a ship at rest is brightest at its label, within half the ship's length and 3 pixels.
+    /// The image has the size of its scene and differs from the product.
     #[test]
     fn labels_follow_a_delivered_image() {
         let changes = [
@@ -149,7 +149,7 @@ mod tests {
         }
     }
 
-    /// Images of a recipe that draws a gain have a median between its ends, another in each image.
+    /// If a recipe draws a gain, the median of each image lies in the gain's range, and the medians differ.
     #[test]
     fn the_gain_is_drawn() {
         let changes = [

@@ -1,4 +1,4 @@
-//! What a data set is made of: the paper's grid, or values that are drawn.
+//! Recipes of data sets: the paper's grid, or random values.
 
 use super::draws::Draws;
 use crate::error::{Error, Result};
@@ -10,17 +10,17 @@ use wake_physics::grey::GreyScale;
 use wake_physics::scene::{Grid, stored_key};
 use whole_files::sentence;
 
-/// What satellites deliver.
+/// Recipe of satellite products.
 const SATELLITES: &str = include_str!("satellites.toml");
-/// What the recipe of a detector changes of it.
+/// Changes of the detector's recipe to it.
 const DETECTOR: &str = include_str!("detector.toml");
-/// What keys begin with that say how images are kept, not what they show.
+/// Prefixes of keys for the format of images, not their content.
 const OF_A_SET: [&str; 3] = ["grid.rows", "grid.columns", "quick_look."];
 
-/// Which scenes a data set has, and how they become images and prompts.
+/// Recipe of a data set: its scenes, and how they are turned into images and prompts.
 ///
-/// As a TOML file, keys that are absent come from the recipe that `base` names, `ranges` where it is absent too, and
-/// unknown ones are errors:
+/// In a TOML file, absent keys are taken from the recipe named by `base`, by default `ranges`, and unknown keys are
+/// errors:
 ///
 /// ```toml
 /// base = "detector"         # paper, ranges, satellites, detector or model
@@ -39,32 +39,32 @@ const OF_A_SET: [&str; 3] = ["grid.rows", "grid.columns", "quick_look."];
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recipe {
-    /// Whether the image has speckle.
+    /// Whether images have speckle.
     pub speckle: bool,
-    /// Whether prompts take all wordings of [`wake_text::Wording`] at random, or the paper's alone.
+    /// Whether prompts use all wordings of [`wake_text::Wording`] at random, or only the paper's.
     pub paraphrase: bool,
-    /// The mapping from σ⁰ to grey, unless the recipe draws quick-looks.
+    /// Mapping from σ⁰ to grey, unless the recipe draws quick-looks.
     #[serde(default)]
     pub grey: GreyScale,
     /// Choice of the scenes.
     pub draw: Draw,
-    /// The values that are not drawn.
+    /// Values that are not drawn.
     pub scene: Scene,
 }
 
 /// Choice of the scenes.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Draw {
-    /// The 3,456 scenes of the paper's grid in a fixed mixed order, then again with other seas: `"paper-grid"`.
+    /// The 3,456 scenes of the paper's grid in a fixed mixed order, repeated with other seas: `"paper-grid"`.
     PaperGrid,
-    /// Values drawn on their own.
+    /// Values drawn independently.
     Values(Draws),
 }
 
 impl Draw {
     const PAPER: &str = "paper-grid";
 
-    /// This with what a recipe says of it.
+    /// Applies the `draw` value of a recipe.
     fn with(self, change: &toml::Value) -> Result<Self> {
         match (self, change) {
             (_, toml::Value::String(name)) if name == Self::PAPER => Ok(Self::PaperGrid),
@@ -101,8 +101,8 @@ impl<'de> Deserialize<'de> for Draw {
 }
 
 impl Default for Recipe {
-    /// The recipe of a small model, `ranges`: the span of the paper's grid, all directions, one ship size, the ship
-    /// anywhere, a fifth open sea; 256 × 256 pixels of 4 m, no speckle, tolerance 1e-2.
+    /// The recipe `ranges`, for a small model: ranges of the paper's grid, all directions, one ship size, the ship anywhere, a
+    /// fifth open sea; 256 × 256 pixels of 4 m, no speckle, tolerance 1e-2.
     fn default() -> Self {
         let mut scene = Scene {
             grid: Grid {
@@ -125,7 +125,7 @@ impl Default for Recipe {
 }
 
 impl Recipe {
-    /// The paper's grid at the defaults of a scene file: 512 × 512 pixels of 2.5 m, with speckle.
+    /// The recipe `paper`: the paper's grid at the defaults of a scene file, 512 × 512 pixels of 2.5 m, with speckle.
     pub fn paper() -> Self {
         Self {
             speckle: true,
@@ -136,11 +136,11 @@ impl Recipe {
         }
     }
 
-    /// Products of satellites: seven sensors, ships of all sizes, and what looks like a wake, see docs/dataset.md.
+    /// The recipe `satellites`: products of seven sensors, with ships of all sizes and wake look-alikes; see docs/dataset.md.
     ///
     /// # Errors
     ///
-    /// None, unless a sensor or a range was changed without the recipe.
+    /// None, unless a sensor or range was changed without the recipe.
     pub fn satellites() -> Result<Self> {
         let empty = Self {
             draw: Draw::Values(Draws::default()),
@@ -150,7 +150,7 @@ impl Recipe {
         empty.merged(SATELLITES)
     }
 
-    /// The recipe of a detector: [`satellites`](Self::satellites) as their images are passed on, see docs/dataset.md.
+    /// The recipe `detector`: [`satellites`](Self::satellites) with delivered images; see docs/dataset.md.
     ///
     /// # Errors
     ///
@@ -159,8 +159,8 @@ impl Recipe {
         Self::satellites()?.merged(DETECTOR)
     }
 
-    /// The recipe of the wake model that ships: the scenes of `ranges` and those of [`satellites`](Self::satellites) in turn, one
-    /// as often as the other, in one mapping to grey and without speckle.
+    /// The recipe `model`, of the shipped wake model: scenes of `ranges` and of [`satellites`](Self::satellites), equally likely,
+    /// with one mapping to grey and without speckle.
     ///
     /// # Errors
     ///
@@ -175,7 +175,7 @@ impl Recipe {
         let weight = |case: &toml::Table| case.get("weight").and_then(number).unwrap_or(1.0);
         let cases: Vec<toml::Table> = cases.into_iter().filter_map(table).collect();
         let total: f64 = cases.iter().map(weight).sum();
-        // What the satellites' scenes share is theirs alone here.
+        // Values shared by all satellite scenes must apply to those scenes alone.
         let mut shared = toml::Table::new();
         flatten("", table_of(&mut satellites, "scene"), &mut shared);
         shared.extend(draw);
@@ -197,7 +197,7 @@ impl Recipe {
         Self::default().changed(changes, "")
     }
 
-    /// A recipe that is built in, by its name: paper, ranges, satellites, detector or model.
+    /// Returns a built-in recipe by name: paper, ranges, satellites, detector or model.
     ///
     /// # Errors
     ///
@@ -217,11 +217,11 @@ impl Recipe {
         }
     }
 
-    /// A recipe that is built in, which no file of its name hides; else that of a file.
+    /// Returns a built-in recipe by name, else reads a file; a file cannot shadow a built-in name.
     ///
     /// # Errors
     ///
-    /// As [`Recipe::named`] where there is no such file, else as [`Recipe::read`].
+    /// As [`Recipe::named`] if there is no such file, else as [`Recipe::read`].
     pub fn named_or_read(name: &str) -> Result<Self> {
         let file = Path::new(name);
         match Self::named(name) {
@@ -234,8 +234,8 @@ impl Recipe {
     ///
     /// # Errors
     ///
-    /// [`Error::Recipe`] with the key or line at fault, [`wake_nn::Error::InvalidOption`] for something that is no distribution,
-    /// [`Error::Scene`] for a value out of its range.
+    /// [`Error::Recipe`] with the key or line at fault, [`wake_nn::Error::InvalidOption`] for a value that is not a distribution,
+    /// [`Error::Scene`] for a value out of range.
     pub fn from_toml(text: &str) -> Result<Self> {
         let mut changes = parsed(text)?;
         let base = match changes.remove("base") {
@@ -255,7 +255,7 @@ impl Recipe {
         Self::from_toml(&whole_files::read_text(path)?)
     }
 
-    /// The recipe with assignments such as `scene.radar.looks=1` made, in order, then checked.
+    /// Applies assignments such as `scene.radar.looks=1` in order, checking the recipe after each.
     ///
     /// The value is TOML; a bare word is a string.
     ///
@@ -282,7 +282,7 @@ impl Recipe {
         self.changed(parsed(text)?, text)
     }
 
-    /// This recipe with values replaced by those of a table; `text`: what the table was read from.
+    /// Replaces values by those of a table; `text` is the source of the table, for messages.
     fn changed(&self, mut changes: toml::Table, text: &str) -> Result<Self> {
         let fail = |message: String| Error::Recipe {
             message: sentence(&message),
@@ -317,7 +317,7 @@ impl Recipe {
     }
 }
 
-/// A table out of another; empty where there is none.
+/// Removes an inner table from a table; empty if there is none.
 fn table_of(from: &mut toml::Table, key: &str) -> toml::Table {
     from.remove(key).and_then(table).unwrap_or_default()
 }
@@ -333,7 +333,7 @@ fn number(value: &toml::Value) -> Option<f64> {
     value.as_float().or(value.as_integer().map(|n| n as f64))
 }
 
-/// The values of a table of tables by their paths.
+/// Flattens nested tables to values by path.
 fn flatten(name: &str, table: toml::Table, into: &mut toml::Table) {
     for (key, value) in table {
         let path = match name {
@@ -349,14 +349,14 @@ fn flatten(name: &str, table: toml::Table, into: &mut toml::Table) {
     }
 }
 
-/// A text of TOML as its table.
+/// Parses TOML text to a table.
 fn parsed(text: &str) -> Result<toml::Table> {
     toml::from_str(text).map_err(|e| Error::Recipe {
         message: sentence(&one_line(text, &e)),
     })
 }
 
-/// What is wrong with a text, and in which line or table of it.
+/// Error message in one line, with the line of the text at fault if it is known.
 fn one_line(text: &str, error: &toml::de::Error) -> String {
     match error.span() {
         Some(span) => {
@@ -371,7 +371,7 @@ fn one_line(text: &str, error: &toml::de::Error) -> String {
     }
 }
 
-/// Gives the radar of a scene the keys that a serialized scene has.
+/// Renames the radar's keys to those of a serialized scene.
 fn with_stored_keys(changes: &mut toml::Table) {
     let scene = changes.get_mut("scene").and_then(toml::Value::as_table_mut);
     let radar = scene.and_then(|scene| scene.get_mut("radar"));
@@ -386,7 +386,7 @@ fn with_stored_keys(changes: &mut toml::Table) {
     *radar = std::mem::take(radar).into_iter().map(stored).collect();
 }
 
-/// Replaces values of `table` by those of `changes`, table by table.
+/// Replaces values of `table` by those of `changes`, recursively.
 fn merge(table: &mut toml::Table, changes: toml::Table) {
     for (key, change) in changes {
         match (table.get_mut(&key), change) {

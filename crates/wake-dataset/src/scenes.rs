@@ -1,4 +1,4 @@
-//! Scene number `index` of a recipe: a pure function.
+//! Scenes of a recipe as a pure function of their index.
 
 use super::delivery::Delivery;
 use super::recipe::{Draw, Recipe};
@@ -14,15 +14,14 @@ use wake_text::{PartialScene, Wording};
 /// Number of scenes in the paper's grid.
 pub const PAPER_SCENES: u64 = 3456;
 
-/// Steps in which the paper's grid is walked: prime, so that every scene comes once, and near the golden section of
-/// the grid, so that the first few already differ in every value.
+/// Stride through the paper's grid: prime, so that every scene comes once, and near the golden section of the grid, so
+/// that even the first scenes differ in every value.
 const PAPER_STRIDE: u64 = 2137;
 
-/// The endless data set of a recipe and a seed.
+/// Endless data set of a recipe and a seed.
 ///
 /// Pair `index` is a function of (recipe, seed, index) alone: its values come from a counter-based generator (see
-/// [`wake_nn::noise`]). Drawn values are rounded as [`PartialScene::of`] rounds them, so that the prompt states the
-/// scene exactly.
+/// [`wake_nn::noise`]). Drawn values are rounded like [`PartialScene::of`], so that the prompt states the scene exactly.
 #[derive(Debug, Clone)]
 pub struct Simulated {
     recipe: Recipe,
@@ -30,11 +29,11 @@ pub struct Simulated {
     sea: Option<Arc<dyn Sea>>,
 }
 
-/// Scenes that are looked at before the first image.
+/// Number of scenes that are checked before the first image.
 const LOOKED_AT: u64 = 16;
 
 impl Simulated {
-    /// The data set of a recipe and a seed.
+    /// Makes the data set of a recipe and a seed.
     ///
     /// # Errors
     ///
@@ -48,12 +47,12 @@ impl Simulated {
         })
     }
 
-    /// The same scenes on another sea than the simulator's, such as one learnt from real images. Its images have their speckle,
-    /// whatever the recipe says of speckle.
+    /// Replaces the simulator's sea by another, such as one learnt from real images. Images then include speckle, whatever the
+    /// recipe's `speckle`.
     ///
     /// # Errors
     ///
-    /// As [`Sea::check_spacing`], for the first scenes; one that comes later is refused when its turn comes.
+    /// As [`Sea::check_spacing`], for the first 16 scenes; later scenes are refused when they are made.
     pub fn with_sea(self, sea: impl Sea) -> Result<Self> {
         for index in 0..LOOKED_AT {
             sea.check_spacing(self.scene(index)?.grid.spacing)?;
@@ -79,12 +78,12 @@ impl Simulated {
         self.seed
     }
 
-    /// Scene number `index`.
+    /// Draws scene number `index`.
     ///
     /// # Errors
     ///
     /// [`Error::Scene`](crate::Error::Scene) or [`Error::Recipe`](crate::Error::Recipe) for values within their ranges
-    /// that no scene can have together.
+    /// that cannot be combined in a scene.
     pub fn scene(&self, index: u64) -> Result<Scene> {
         let (base, random) = (&self.recipe.scene, NoiseSource::new(self.seed));
         let drawn = match &self.recipe.draw {
@@ -93,12 +92,12 @@ impl Simulated {
         };
         drawn.validate()?;
         let mut scene = PartialScene::of(&drawn).onto(&drawn).unwrap_or(drawn);
-        // 52 bits: every reader of JSON takes them for a whole number.
+        // 52 bits, which every JSON reader parses exactly.
         scene.seed = (random.uniform(streams::SEEDS, index) * (1u64 << 52) as f64) as u64;
         Ok(scene)
     }
 
-    /// Gain and offset of image number `index` as a quick-look, if it is one.
+    /// Gain and offset of image number `index`; `None` if it is not a quick-look.
     pub(super) fn quick_look(&self, index: u64) -> Option<[f64; 2]> {
         match &self.recipe.draw {
             Draw::PaperGrid => None,
@@ -106,7 +105,7 @@ impl Simulated {
         }
     }
 
-    /// Delivery of image number `index`; `None` where the image is the product's own.
+    /// Delivery of image number `index`; `None` if the image is the product itself.
     pub fn delivery(&self, index: u64) -> Option<Delivery> {
         match &self.recipe.draw {
             Draw::PaperGrid => None,
@@ -114,7 +113,7 @@ impl Simulated {
         }
     }
 
-    /// The words for scene number `index`.
+    /// Wording of the prompt of scene number `index`.
     pub(super) fn wording(&self, index: u64) -> Wording {
         if !self.recipe.paraphrase {
             return Wording::Paper;
@@ -125,7 +124,7 @@ impl Simulated {
     }
 }
 
-/// The values that the paper's grid states, on a base that has all others.
+/// A scene of the paper's grid, with all values that the grid does not state from `base`.
 fn paper_scene(index: u64, base: &Scene) -> Scene {
     let at = (index % PAPER_SCENES) * PAPER_STRIDE % PAPER_SCENES;
     let stated = paper_grid().nth(at as usize).unwrap_or_default();
@@ -146,12 +145,12 @@ mod tests {
         Simulated::new(recipe, seed).unwrap()
     }
 
-    /// A range within [min, max].
+    /// Strategy for a range within [min, max].
     fn range(min: f64, max: f64) -> impl Strategy<Value = [f64; 2]> {
         (min..=max, min..=max).prop_map(|(a, b)| [a.min(b), a.max(b)])
     }
 
-    /// Ranges of some values of a scene.
+    /// Random ranges of values of a scene.
     #[derive(Debug)]
     struct Ranges {
         speed: [f64; 2],
@@ -203,13 +202,13 @@ mod tests {
         }
     }
 
-    /// Whether a value lies in a range, but for rounding to a step.
+    /// Whether a value lies in a range, up to rounding to a step.
     fn within(value: f64, [low, high]: [f64; 2], step: f64) -> bool {
         let slack = 0.5 * step * (1.0 + 1e-9) + 1e-9;
         (low - slack..=high + slack).contains(&value)
     }
 
-    /// Whether a direction lies in a range, give or take full turns and half a degree.
+    /// Whether a direction lies in a range, up to full turns and half a degree.
     fn turned_within(value: f64, range: [f64; 2]) -> bool {
         (-3..=3).any(|turn| within(value + 360.0 * f64::from(turn), range, 1.0))
     }
@@ -234,14 +233,14 @@ mod tests {
             }
         }
 
-        /// A scene depends on nothing but recipe, seed and index; every wording states all that was drawn.
+        /// A scene depends only on recipe, seed and index; every wording states all drawn values.
         #[test]
         fn scenes_repeat_and_are_fully_stated(ranges in ranges(), seed in any::<u64>(), index in any::<u64>()) {
             let source = ranges.simulated(seed);
             let scene = source.scene(index).unwrap();
             let _others: Vec<_> = (0..3).map(|i| source.scene(i)).collect();
             prop_assert_eq!(&ranges.simulated(seed).scene(index).unwrap(), &scene);
-            // A line of JSON gives it back to the bit.
+            // JSON preserves every bit.
             let line = serde_json::to_string(&scene).unwrap();
             prop_assert_eq!(&serde_json::from_str::<Scene>(&line).unwrap(), &scene);
             for wording in Wording::ALL {
@@ -305,7 +304,7 @@ mod tests {
         assert!((0..50).all(|i| one.scene(i).unwrap() != two.scene(i).unwrap()));
     }
 
-    /// A key that is added, or drawn otherwise, changes nothing but its own value.
+    /// Adding a key, or changing its distribution, changes only its own value.
     #[test]
     fn keys_are_drawn_apart() {
         let changes = ["draw.ship.speed = [1, 2]", "draw.radar.looks = [1, 9]"];
@@ -324,8 +323,8 @@ mod tests {
         }
     }
 
-    /// Sensors come in their weights, each with its own pixels and what else belongs to it; the radar is as a scene file
-    /// has it that names them.
+    /// Sensors come in proportion to their weights, each with the other values of its table; the radar is the same as in a scene
+    /// file that names the sensor.
     #[test]
     fn values_that_belong_together_come_together() {
         let text = r#"
@@ -359,7 +358,7 @@ mod tests {
         assert!(count.abs_diff(300) < 44, "{count}");
     }
 
-    /// Every scene of the grid once, all other values at their defaults; the next round differs in its seas.
+    /// Every scene of the grid comes once, with all other values at their defaults; the next round differs only in its seas.
     #[test]
     fn the_papers_grid_is_complete_and_mixed() {
         let source = Simulated::new(Recipe::paper(), 5).unwrap();
@@ -426,8 +425,8 @@ mod tests {
         }
     }
 
-    /// Echo and roll, edges and their response are drawn apart: a ship without the one has none of the other, as a scene
-    /// must.
+    /// Echo and roll, and edges and their response time, are drawn independently, but a ship without an echo has no roll, and one
+    /// without edges no response time, as a scene requires.
     #[test]
     fn a_ship_has_only_the_keys_that_act() {
         let changes = [
@@ -451,7 +450,7 @@ mod tests {
         assert_eq!(seen.len(), 4);
     }
 
-    /// Either name of a key draws the same scenes, and manifests hold the first.
+    /// Both names of a key draw the same scenes, and manifests contain the first name.
     #[test]
     fn keys_of_two_names_draw_the_same_scenes() {
         let [first, new] = [
@@ -574,8 +573,7 @@ mod tests {
         assert!(message.to_string().contains("no/such.toml"), "{message}");
     }
 
-    /// The recipe for a detector has what it promises: every sensor of its list, no ship and several, look-alikes.
-    /// Half of the scenes are those of `ranges`, half those of the detector, key by key.
+    /// Half of the scenes of `model` have the values of `ranges`, the other half those of `satellites`.
     #[test]
     fn the_recipe_of_the_model_has_the_scenes_of_both() {
         let source = Simulated::new(Recipe::model().unwrap(), 3).unwrap();
@@ -584,7 +582,7 @@ mod tests {
         let (narrow, wide): (Vec<_>, Vec<_>) = scenes
             .into_iter()
             .partition(|scene| scene.radar.sensor.is_none());
-        // 400 draws: 0.025 of chance, four times.
+        // Four standard errors of 0.025 for 400 draws.
         assert!((narrow.len() as f64 / 400.0 - 0.5).abs() < 0.1);
         let ranges = Recipe::default().scene;
         for scene in narrow {
@@ -639,7 +637,7 @@ mod tests {
         }
     }
 
-    /// A recipe that delivers has the scenes of one that does not, but for the spacing: so many pixels a resolution cell.
+    /// The recipe `detector` has the scenes of `satellites`, except for the values that it changes, such as the spacing.
     #[test]
     fn the_recipe_of_a_detector_delivers_the_satellites() {
         let source = Simulated::new(Recipe::detector().unwrap(), 9).unwrap();
@@ -662,7 +660,7 @@ mod tests {
             };
             if scene.grid.spacing.to_bits() != other.grid.spacing.to_bits() {
                 fine += 1;
-                // Steps of 1 cm in pixels of 1.5 m and more.
+                // The spacing is rounded to 1 cm, and is at least 1.5 m.
                 assert!((0.99..=3.83).contains(&cell(&scene)), "{}", cell(&scene));
             }
             let ships = || scene.ships.iter();
@@ -686,7 +684,7 @@ mod tests {
         };
         share(fine, 0.75);
         share(mottled, 0.5);
-        // Of eight in ten images with ships, some with several.
+        // Out of the eight in ten images with ships, some with several.
         assert!(turning > count as usize / 8 && hardly_dark > count as usize / 8);
         let deliveries: Vec<_> = (0..count).map(|index| source.delivery(index)).collect();
         let some = deliveries.iter().flatten();

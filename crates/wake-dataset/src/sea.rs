@@ -1,22 +1,22 @@
-//! Seas that replace the simulator's.
+//! Replacements of the simulator's sea.
 
 use crate::error::Result;
 use std::fmt::Debug;
 use wake_physics::{Field, Scene};
 
-/// A sea that draws the images of scenes itself, with its own speckle, such as one learnt from real images.
+/// A sea that makes the images of scenes itself, with its own speckle, such as one learnt from real images.
 pub trait Sea: Debug + Send + Sync + 'static {
-    /// Checks that the sea can be drawn with pixels of this side \[m\].
+    /// Checks that the sea supports a pixel spacing \[m\].
     ///
     /// # Errors
     ///
-    /// For a side that the sea does not have.
+    /// If the sea does not support the spacing.
     fn check_spacing(&self, spacing: f64) -> Result<()>;
 
-    /// The image of a scene on this sea: intensity with speckle, `[rows, columns]` of the scene's grid.
+    /// Makes the image of a scene on this sea: intensity with speckle, `[rows, columns]` of the scene's grid.
     ///
     /// # Errors
     ///
-    /// If it does not fit in memory, or cannot be drawn.
+    /// If the image does not fit in memory or cannot be made.
     fn image(&self, scene: &Scene) -> Result<Field>;
 }

@@ -1,18 +1,18 @@
-//! Orders of things, each once a round, without a list of them.
+//! Random permutations without a list.
 
 use crate::streams;
 use wake_nn::noise::NoiseSource;
 
-/// Rounds of the network that shuffles.
+/// Rounds of the Feistel network.
 const ROUNDS: u32 = 6;
 
-/// Which of `count` things comes at a position of an endless walk through them: each once in every round of `count`
-/// positions, in another order each round. A function of (seed, position) alone.
+/// Index, from 0 to below `count`, at a position of an endless shuffled sequence: each index once in every epoch of `count`
+/// positions, in another order each epoch. A function of (seed, position) alone.
 ///
 /// - `count`: at least 1
 ///
-/// A Feistel network permutes the numbers of an even number of bits; those that fall beyond `count` are permuted again
-/// until they do not ("cycle walking").
+/// A Feistel network permutes numbers of an even number of bits; results of `count` or more are permuted again until they are
+/// below it ("cycle walking").
 ///
 /// # References
 ///
@@ -28,7 +28,7 @@ pub fn shuffled(position: u64, count: u64, seed: u64) -> u64 {
     place
 }
 
-/// A permutation of the numbers of 2·`half` bits.
+/// Permutation of the numbers of 2·`half` bits.
 fn feistel(number: u64, half: u32, source: NoiseSource) -> u64 {
     let size = 1u64 << half;
     let (mut left, mut right) = (number / size, number % size);
@@ -55,8 +55,8 @@ mod tests {
         }
     }
 
-    /// Each place is equally likely for a position: χ² of 8 places over 4,000 orders below its 1e-5 quantile for 7
-    /// degrees of freedom, 35.
+    /// Each index is equally likely at a position: χ² of 8 indices over 4,000 orders is below 35, its upper 1e-5 quantile for 7
+    /// degrees of freedom.
     #[test]
     fn orders_are_even() {
         let mut counts = [0u32; 8];

@@ -1,4 +1,4 @@
-//! Where pairs come from: endless functions of a position.
+//! Sources of pairs: endless functions of a position.
 
 use super::folder::{Epochs, Folder};
 use super::pair::Pair;
@@ -11,16 +11,16 @@ use std::sync::Arc;
 
 /// An endless sequence of pairs, each with the scene that made its image: a pure function of the position.
 ///
-/// Pair p is the same whoever asks for it, how often, in whichever order and together with whichever others.
+/// Pair p does not depend on the order, the number or the grouping of requests.
 pub trait Source: Debug + Send + Sync + 'static {
     /// Rows and columns of every image.
     fn size(&self) -> [usize; 2];
 
-    /// The pairs at a range of positions, in order; those of a batch are asked for at once.
+    /// Returns the pairs at a range of positions, in order; a batch is requested at once.
     ///
     /// # Errors
     ///
-    /// If one cannot be made or read.
+    /// If a pair cannot be made or read.
     fn items(&self, positions: Range<u64>) -> Result<Vec<Pair>>;
 }
 
@@ -41,7 +41,7 @@ impl Source for Folder {
         [grid.rows, grid.columns]
     }
 
-    /// In the order of the folder, from its beginning again after its end.
+    /// In the order of the folder, starting again after its end.
     fn items(&self, positions: Range<u64>) -> Result<Vec<Pair>> {
         let count = self.len().max(1);
         let pairs = positions.into_par_iter().map(|p| self.pair(p % count));

@@ -1,10 +1,10 @@
-//! Streams of uniform numbers that this crate draws from a seed; see [`wake_nn::noise`].
+//! Random streams that this crate uses of a seed; see [`wake_nn::noise`].
 
 /// Seeds of scenes.
 pub const SEEDS: u32 = 1000;
 /// Wordings of scenes.
 pub const WORDINGS: u32 = 1001;
-/// The order of examples; round i of the shuffle has `ORDER + i`.
+/// Order of examples; round i of the shuffle uses `ORDER + i`.
 pub const ORDER: u32 = 1 << 20;
-/// Values of a scene: each key has one of the streams from here on.
+/// Values of a scene; each key uses a stream from here up.
 pub const VALUES: u32 = 1 << 31;

@@ -1,4 +1,4 @@
-//! Data sets on disk: the same bytes however they were made, nothing lost, nothing foreign accepted.
+//! Data sets on disk: the same bytes however they are made, nothing lost, no foreign files accepted.
 
 use super::*;
 use crate::error::{Error, Result};
@@ -12,7 +12,7 @@ use whole_files::{sealed, unsealed};
 
 const COUNT: u64 = 7;
 
-/// A quick set: 24 × 20 pixels, with and without ships.
+/// A small set: 24 × 20 pixels, with and without ships.
 fn manifest() -> Manifest {
     let changes = [
         "scene.grid.rows = 24",
@@ -34,7 +34,7 @@ fn shard(number: u64, of: u64) -> Manifest {
     }
 }
 
-/// The set of a manifest, from its own source.
+/// Writes the set of a manifest from the manifest's source.
 fn write(
     folder: &Path,
     manifest: &Manifest,
@@ -44,7 +44,7 @@ fn write(
     super::write(folder, manifest, &manifest.source()?, jobs, watch)
 }
 
-/// Relative path → content of every file below a folder.
+/// Content of every file below a folder, by relative path.
 type Tree = BTreeMap<PathBuf, Vec<u8>>;
 
 fn tree(folder: &Path) -> Tree {
@@ -72,7 +72,7 @@ fn plant(folder: &Path, files: &Tree) {
     }
 }
 
-/// The whole set, made in one go.
+/// The whole set, made in one run.
 fn whole() -> Tree {
     let folder = TempDir::new().unwrap();
     write(folder.path(), &manifest(), 1, |_| ()).unwrap();
@@ -128,7 +128,7 @@ fn jobs_and_shards_change_no_byte() {
     }
 }
 
-/// Whatever a killed run left, the next one makes the same set, and only what is missing.
+/// Whatever a killed run left, the next run makes only the missing pairs and ends with the same set.
 #[test]
 fn a_killed_run_continues() {
     let whole = whole();
@@ -161,7 +161,7 @@ fn a_killed_run_continues() {
             assert_eq!(tree(folder.path()), whole, "{lines} lines, cut at {cut}");
         }
     }
-    // Killed while it wrote the manifest, or before.
+    // Killed while or before writing the manifest.
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join(".dataset.json.1.tmp"), "{").unwrap();
     assert_eq!(made(folder.path(), &manifest()), COUNT);
@@ -171,7 +171,7 @@ fn a_killed_run_continues() {
     assert_eq!(tree(folder.path()), whole);
 }
 
-/// Numbers that a reader of JSON may get wrong in the last place do not make a set foreign to itself.
+/// A set continues even if its numbers are ones that a JSON reader may get wrong in the last place.
 #[test]
 fn a_set_with_awkward_numbers_continues() {
     let changes = [
@@ -234,7 +234,7 @@ fn two_shards() -> Tree {
     tree(folder.path())
 }
 
-/// A merge that was killed after any of its moves, or while it removed the shards, ends as if it had not been.
+/// A merge that was killed after any move, or while removing the shards, ends with the same set when repeated.
 #[test]
 fn a_killed_merge_continues() {
     let (whole, start) = (whole(), two_shards());
@@ -292,7 +292,7 @@ fn a_killed_merge_continues() {
     check(&left, "without shard 0");
 }
 
-/// What only looks like a shard stays.
+/// Folders that only look like shards of the set are kept.
 #[test]
 fn a_merge_removes_nothing_foreign() {
     let folder = TempDir::new().unwrap();
@@ -310,7 +310,7 @@ fn a_merge_removes_nothing_foreign() {
     assert_eq!(tree(&path), before);
 }
 
-/// The message of an error, which must name the folder.
+/// Returns the error's message and asserts that it names the folder.
 fn refused<T>(result: Result<T>, folder: &Path) -> String {
     let message = result.err().expect("an error").to_string();
     assert!(message.contains(&folder.display().to_string()), "{message}");
@@ -366,7 +366,7 @@ fn other_sets_are_refused() {
     }
 }
 
-/// Notes of what kind the values are under a path, and below it.
+/// Records the kinds of the values at and below a path, and asserts that each path has one kind.
 fn kinds(path: &str, value: &serde_json::Value, found: &mut BTreeMap<String, &'static str>) {
     use serde_json::Value;
     let kind = match value {
@@ -391,8 +391,8 @@ fn kinds(path: &str, value: &serde_json::Value, found: &mut BTreeMap<String, &'s
     }
 }
 
-/// A table's column holds one kind of value, as readers of tables ask; scenes of several sensors have words and numbers under
-/// one key.
+/// Each column holds one kind of value, as table readers require, although scenes of several sensors have words and numbers
+/// under one key.
 #[test]
 fn columns_hold_one_kind_of_value() {
     let small = ["scene.grid.rows = 24", "scene.grid.columns = 24"];
@@ -437,7 +437,7 @@ fn broken_lines_are_named() {
             message.contains(&format!("metadata.jsonl, line {}:", at + 1)),
             "{message}"
         );
-        // Nothing was repaired behind the user's back.
+        // Nothing was changed silently.
         assert_eq!(tree(folder.path()), files);
     }
     for (text, line) in [(text.clone() + &text, COUNT + 1), (spoilt(3, "[]"), 4)] {
@@ -494,7 +494,7 @@ fn unfinished_sets_are_neither_read_nor_merged() {
     assert_eq!(tree(path), before);
 }
 
-/// What is read is what was made, but for 8 bits of grey.
+/// Pairs read back equal the pairs that were made, up to rounding of grey to 8 bits.
 #[test]
 fn a_folder_is_read_back() {
     let folder = TempDir::new().unwrap();
@@ -524,7 +524,7 @@ fn a_full_disk_is_one_sentence_and_loses_nothing() {
     let folder = TempDir::new().unwrap();
     let path = folder.path();
     plant(path, &whole);
-    // A folder where a file should go fails as a full disk does: the write is refused by the system.
+    // A folder in place of a file makes the system refuse the write, as on a full disk.
     fs::remove_file(path.join("images/000004.png")).unwrap();
     fs::create_dir_all(path.join("images/000004.png/x")).unwrap();
     fs::remove_file(path.join("labels/000004.txt")).unwrap();
@@ -538,8 +538,8 @@ fn a_full_disk_is_one_sentence_and_loses_nothing() {
     assert_eq!(tree(path), whole);
 }
 
-/// Every image is in one list; the share is kept to half an image, and other seeds choose others. What the paper's grid
-/// shows twice is on one side.
+/// Every image is in one list, the share is exact to half an image, and other seeds choose other images. Repeated scenes of
+/// the paper's grid are in one split.
 #[test]
 fn training_and_validation_share_no_scene() {
     let split = |manifest: &Manifest| -> Vec<bool> {
@@ -606,7 +606,8 @@ fn shards_cover_every_index_once() {
     }
 }
 
-/// σ⁰ follows from a quick-look and its line, to half a level, where grey is not cut; a set that is there is accepted.
+/// σ⁰ can be recovered from a quick-look and its line, to half a level where grey is not saturated; an existing set is
+/// accepted.
 #[test]
 fn quick_looks_can_be_undone() {
     let changes = [
@@ -644,8 +645,8 @@ fn quick_looks_can_be_undone() {
     assert!(compared > 400, "{compared}");
 }
 
-/// One mapping in amplitude for a whole set: σ⁰ follows from any image and the manifest, to half a level, where grey is not
-/// cut.
+/// With one amplitude mapping for a whole set, σ⁰ can be recovered from any image and the manifest, to half a level where grey
+/// is not saturated.
 #[test]
 fn grey_in_amplitude_can_be_undone() {
     let scale = wake_physics::grey::GreyScale::amplitude_around(0.05);
@@ -679,7 +680,7 @@ fn grey_in_amplitude_can_be_undone() {
     }
     assert!(compared > 400, "{compared}");
 
-    // Two mappings in one manifest are none.
+    // A manifest with two different mappings is refused.
     let path = folder.path().join("dataset.json");
     let text = fs::read_to_string(&path).unwrap();
     let object = unsealed(text.trim_end()).unwrap();
@@ -722,13 +723,12 @@ fn white_sea(spacing: Option<f64>) -> NoisySea {
     noisy_sea(2, spacing)
 }
 
-/// The same of other noise.
+/// White noise with another seed.
 fn noisy_sea(seed: u64, spacing: Option<f64>) -> NoisySea {
     NoisySea { seed, spacing }
 }
 
-/// Images show the learnt sea, everything else is that of the set without one; the folder says which sea it is, and a run
-/// with another, or none, is refused.
+/// A learnt sea changes only the images; the manifest names the sea, and a run with another sea, or without one, is refused.
 #[test]
 fn a_learnt_sea_changes_images_alone() {
     let recipe = manifest().recipe;
@@ -741,7 +741,7 @@ fn a_learnt_sea_changes_images_alone() {
     let folder = TempDir::new().unwrap();
     super::write(folder.path(), &of_sea("one"), &on_sea, 2, |_| ()).unwrap();
     let (plain, drawn) = (whole(), tree(folder.path()));
-    // Lines have the checksums of their images; all else in them is the same.
+    // Lines differ only in the checksums of their images.
     let lines = |tree: &Tree| -> Vec<serde_json::Value> {
         let text = String::from_utf8_lossy(&tree[Path::new("metadata.jsonl")]).into_owned();
         let mut lines: Vec<serde_json::Value> = text

@@ -1,4 +1,4 @@
-//! A data set as `WebDataset` shards: tar files that trainers read one after the other.
+//! Export of a data set as `WebDataset` shards: tar files that trainers read sequentially.
 
 use super::folder::Folder;
 use super::layout::{Layout, broken, image_name};
@@ -12,21 +12,21 @@ use whole_files::checksum;
 
 /// Size of the blocks of a tar file \[bytes\].
 const BLOCK: usize = 512;
-/// The splits, those to train with first.
+/// The splits, training first.
 const SPLITS: [&str; 2] = ["train", "validation"];
 
-/// Writes the pairs of a folder into `train-000000.tar`, …, `validation-000000.tar`, …, of at most `each` pairs; returns their paths.
+/// Writes the pairs of a folder into `train-000000.tar`, …, `validation-000000.tar`, …, and returns the paths of these shards.
 ///
-/// A pair is three files: `000007.png`, its prompt `000007.txt`, and its line of `metadata.jsonl` as `000007.json`. The bytes depend on
-/// the set alone. Times are 0 and owners are root, as in no real archive, so that equal sets have equal bytes.
+/// A pair is three files: `000007.png`, its prompt `000007.txt`, and its line of `metadata.jsonl` as `000007.json`. The bytes
+/// depend on the set alone: all times are 0 and all owners root, so that equal sets have equal bytes.
 ///
-/// - `out`: made if absent; empty
-/// - `each`: at least 1
+/// - `out`: folder of the shards, made if absent; must not contain tar files
+/// - `each`: largest number of pairs per shard, at least 1
 ///
 /// # Errors
 ///
-/// [`Error::Dataset`](crate::Error::Dataset) for a folder that is no finished set, a damaged image, or a folder `out` that is not empty;
-/// [`wake_nn::Error::Io`] where it cannot be written.
+/// [`Error::Dataset`](crate::Error::Dataset) for a folder that is not a finished set, a damaged image, or a folder `out` that
+/// contains tar files; [`wake_nn::Error::Io`] if a shard cannot be written.
 ///
 /// # References
 ///
@@ -56,9 +56,9 @@ pub fn write_webdataset(folder: &Path, out: &Path, each: u64) -> Result<Vec<Path
     Ok(written)
 }
 
-/// The three files of a pair with their endings, as [`write_webdataset`] has them: `json`, `png`, `txt`.
+/// Returns the three files of a pair with their extensions, as in [`write_webdataset`]: `json`, `png`, `txt`.
 ///
-/// For those who make shards pair by pair, such as a cluster.
+/// For programs that make shards pair by pair, such as on a cluster.
 ///
 /// # Errors
 ///
@@ -74,7 +74,7 @@ pub fn sample_files(pair: &Pair) -> Result<[(&'static str, Vec<u8>); 3]> {
     Ok([("json", line), ("png", png), ("txt", prompt)])
 }
 
-/// The three files of a pair of a folder.
+/// Appends the three files of a folder's pair to an archive.
 fn sample(archive: &mut Vec<u8>, folder: &Path, set: &Folder, position: u64) -> Result<()> {
     let (index, row) = set.row(position)?;
     let line = serde_json::to_vec(row);
@@ -106,7 +106,7 @@ fn append(archive: &mut Vec<u8>, name: &str, content: &[u8]) -> std::io::Result<
     put(116, b"0000000\0");
     put(124, format!("{:011o}\0", content.len()).as_bytes());
     put(136, b"00000000000\0");
-    // While the sum is taken its own field is blank.
+    // The checksum counts its own field as blanks.
     put(148, b"        ");
     put(156, b"0");
     put(257, b"ustar\x0000");
@@ -125,7 +125,7 @@ mod tests {
     use super::*;
     use crate::{Manifest, Recipe, write};
 
-    /// The names and contents of an archive, by the description of the format.
+    /// Reads the names and contents of an archive, by the description of the format.
     fn read(archive: &[u8]) -> Vec<(String, Vec<u8>)> {
         assert!(archive.len().is_multiple_of(BLOCK));
         let (mut at, mut files) = (0, Vec::new());
@@ -156,7 +156,7 @@ mod tests {
         files
     }
 
-    /// Each pair is in one shard of its split, with the bytes of its image and its prompt; a second writing gives the same bytes.
+    /// Each pair is in one shard of its split, with the bytes of its image and its prompt; writing twice gives the same bytes.
     #[test]
     fn shards_hold_the_set() {
         let changes = [

@@ -1,4 +1,4 @@
-//! Makes a data set in a folder, or what is missing of it.
+//! Makes a data set in a folder, or completes one.
 
 use super::annotations::{Coco, data_yaml};
 use super::layout::{Layout, Manifest, Shard, broken};
@@ -12,29 +12,28 @@ use std::path::Path;
 use wake_physics::output;
 use whole_files::{FolderLock, checksum, failed};
 
-/// Progress of a data set.
+/// Progress of making a data set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
-    /// Pairs that are there.
+    /// Number of finished pairs.
     pub done: u64,
-    /// Pairs that there will be.
+    /// Total number of pairs.
     pub total: u64,
-    /// Pairs made by this run.
+    /// Number of pairs made by this run.
     pub made: u64,
 }
 
-/// Makes the data set of a manifest in a folder on `jobs` threads, continuing what an earlier run began.
+/// Makes the data set of a manifest in a folder on `jobs` threads, continuing an earlier run.
 ///
-/// The folder's content is a function of the manifest alone, byte for byte. A run that is killed leaves no
-/// half-written file; the next one continues, after it has read what is there and compared it with its checksums. `watch`
-/// hears of every pair.
+/// The folder's content is a function of the manifest alone, byte for byte. A killed run leaves no half-written file; the next
+/// run continues after checking existing files against their checksums. `watch` is called at the start and after every pair.
 ///
-/// - `source`: the manifest's own, on its learnt sea where it names one
+/// - `source`: the manifest's source, on the learnt sea that the manifest names, if any
 ///
 /// # Errors
 ///
 /// [`Error::Dataset`] if the folder holds something else or a damaged file, [`wake_nn::Error::Io`] if it cannot be written,
-/// [`wake_nn::Error::InvalidOption`] for a source of another recipe or seed, or with a sea that the manifest does not name.
+/// [`wake_nn::Error::InvalidOption`] for a source of another recipe or seed, or if only one of source and manifest has a sea.
 pub fn write(
     folder: &Path,
     manifest: &Manifest,
@@ -66,7 +65,7 @@ pub fn write(
     finish(folder, manifest, &log.finish()?)
 }
 
-/// Whether a source makes the pairs of a manifest.
+/// Checks that a source makes the pairs of a manifest.
 fn check_source(manifest: &Manifest, source: &Simulated) -> Result<()> {
     let same = source.seed() == manifest.seed && *source.recipe() == manifest.recipe;
     let refuse = |value: &str, expected: &str| {
@@ -93,15 +92,15 @@ fn check_source(manifest: &Manifest, source: &Simulated) -> Result<()> {
     }
 }
 
-/// Takes a folder that is empty, or that an earlier run began for the same `dataset.json` and shard.
+/// Locks a folder that is empty, or that an earlier run began with the same `dataset.json` and shard.
 ///
-/// The folder is this process's until the lock is dropped.
+/// The folder belongs to this process until the lock is dropped.
 pub(super) fn claim(folder: &Path, manifest: &str, shard: Option<Shard>) -> Result<FolderLock> {
     let lock = whole_files::lock_folder(folder)?;
     let layout = Layout(folder);
     let path = layout.manifest();
     match Manifest::read(folder)? {
-        // Texts are compared: numbers that went through JSON may differ in their last bit.
+        // Compare texts, because numbers parsed from JSON may differ in their last bit.
         Some(found) if found.shard == shard && is_text(&path, manifest) => {}
         Some(_) => {
             let message = "made with another recipe, seed, count or shard; choose another folder";
@@ -129,8 +128,7 @@ pub(super) fn is_text(path: &Path, text: &str) -> bool {
     whole_files::read_regular(path).is_ok_and(|found| found == text.as_bytes())
 }
 
-/// Whether a folder holds nothing but what a run may have left before its `dataset.json`: shards, the note of its own
-/// shard, files half-written.
+/// Whether a folder holds only files that may precede its `dataset.json`: shards, its own `shard.json`, temporary files.
 fn is_free(folder: &Path, shard: Option<Shard>) -> Result<bool> {
     let mut entries = std::fs::read_dir(folder).map_err(|e| failed("read", folder, e))?;
     Ok(entries.all(|entry| {
@@ -143,18 +141,18 @@ fn is_free(folder: &Path, shard: Option<Shard>) -> Result<bool> {
     }))
 }
 
-/// Pairs to be made.
+/// Pairs that are still to be made.
 struct Missing {
     indices: Vec<u64>,
-    /// Of those that lost only files: the number of their line, and its row.
+    /// Line number and row of pairs that have a line but lack files.
     lines: BTreeMap<u64, (usize, Row)>,
 }
 
-/// Pairs without a line, or without their files.
+/// Finds pairs without a line or without all of their files.
 ///
 /// # Errors
 ///
-/// [`Error::Dataset`] with the first file that is not as it was written.
+/// [`Error::Dataset`] for the first file that differs from what was written.
 fn missing(folder: &Path, manifest: &Manifest, rows: &Rows) -> Result<Missing> {
     let grid = &manifest.recipe.scene.grid;
     let size = [grid.rows, grid.columns];
@@ -183,7 +181,7 @@ fn missing(folder: &Path, manifest: &Manifest, rows: &Rows) -> Result<Missing> {
     })
 }
 
-/// Makes pairs and writes their files on `jobs` threads; their rows come in order.
+/// Makes pairs and writes their files on `jobs` threads; rows are returned in order.
 fn make(
     folder: &Path,
     source: &Simulated,
@@ -213,7 +211,7 @@ fn make(
     })
 }
 
-/// Writes what is known only at the end.
+/// Writes the files that need all pairs: COCO labels, lists of the splits and `data.yaml`.
 pub(super) fn finish(folder: &Path, manifest: &Manifest, rows: &Rows) -> Result<()> {
     let (layout, grid) = (Layout(folder), &manifest.recipe.scene.grid);
     let images = rows

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, Result};
 use crate::wake::Detection;
 
-/// Beta calibration: the probability that belongs to a number between 0 and 1.
+/// Beta calibration: maps a number between 0 and 1 to a probability.
 ///
 /// ```text
 /// p(x) = 1/(1 + exp(−a ln x + b ln(1 − x) − c)),    a, b ≥ 0
@@ -27,24 +27,24 @@ pub struct Beta {
     pub c: f64,
 }
 
-/// Numbers closer to 0 or 1 than this count as this far away.
+/// Numbers are clamped to at least this distance from 0 and 1.
 const LEAST: f64 = 1e-6;
-/// No more steps of Newton's method, and the step below which no further one is taken.
+/// Largest number of Newton steps, and the step size below which the iteration stops.
 const STEPS: usize = 100;
 const CONVERGED: f64 = 1e-10;
 
 impl Beta {
-    /// The probability of a number.
+    /// Returns the probability for a number.
     #[must_use]
     pub fn of(&self, x: f64) -> f64 {
         let [rising, falling, one] = features(x);
         logistic(self.a * rising + self.b * falling + self.c * one)
     }
 
-    /// The curve of highest likelihood for numbers and whether each was right; rises with the number, and is constant where there
-    /// are no numbers.
+    /// Fits the curve by maximum likelihood to numbers and whether each was right; the curve never falls, and is constant without
+    /// numbers.
     ///
-    /// Right and wrong count as (n₊ + 1)/(n₊ + 2) and 1/(n₋ + 2), so that separable numbers have finite coefficients.
+    /// The targets for right and wrong are (n₊ + 1)/(n₊ + 2) and 1/(n₋ + 2), so that separable numbers give finite coefficients.
     ///
     /// # References
     ///
@@ -58,7 +58,7 @@ impl Beta {
             .iter()
             .map(|&(x, is_right)| (features(x), targets[usize::from(is_right)]))
             .collect();
-        // A weight below 0 makes the curve fall somewhere: it is left out.
+        // A negative weight would make the curve fall somewhere, so its feature is left out.
         let mut used = [true; 3];
         loop {
             let found = newton(&rows, used);
@@ -84,7 +84,7 @@ fn logistic(logit: f64) -> f64 {
     1.0 / (1.0 + (-logit).exp())
 }
 
-/// Coefficients of a logistic regression; those that are not used stay 0.
+/// Coefficients of a logistic regression by Newton's method; unused ones stay 0.
 fn newton(rows: &[([f64; 3], f64)], used: [bool; 3]) -> [f64; 3] {
     let mut found = [0.0; 3];
     for _ in 0..STEPS {
@@ -111,7 +111,7 @@ fn newton(rows: &[([f64; 3], f64)], used: [bool; 3]) -> [f64; 3] {
         }
         let step = solved(curvature, gradient);
         let longest = step.iter().fold(0.0f64, |longest, x| longest.max(x.abs()));
-        // Far from the optimum a whole step may overshoot.
+        // Far from the optimum, a full step may overshoot.
         let share = (2.0 / longest).min(1.0);
         found
             .iter_mut()
@@ -143,36 +143,36 @@ fn solved(mut matrix: [[f64; 3]; 3], mut right: [f64; 3]) -> [f64; 3] {
     right
 }
 
-/// Probabilities of the detections of one way of searching, and the score from which on they are sure.
+/// Calibration curves of one search mode, and the score threshold of sure detections.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Probabilities {
     /// Probability of a wake, in either direction, by score.
     pub wake: Beta,
-    /// Probability that tip and end are not taken for each other, by (1 + [`forward`](Detection::forward))/2.
+    /// Probability that tip and end are not confused, by (1 + [`forward`](Detection::forward))/2.
     pub direction: Beta,
-    /// Score from which on a detection is sure.
+    /// Lowest score of a sure detection.
     pub sure_from: f32,
-    /// False alarms from that score on, per 1,000 km² of simulated sea without ships.
+    /// False alarms at or above that score, per 1,000 km² of simulated sea without ships.
     pub false_alarms: f64,
 }
 
-/// Probabilities of the detections of a network.
+/// Calibration of a network's scores.
 ///
-/// `wake evaluate calibration` makes them; they lie beside the weights, as `NAME.calibration.json`.
+/// `wake evaluate calibration` writes it beside the weights, as `NAME.calibration.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Calibration {
-    /// CRC-32 of the file of weights that the calibration belongs to.
+    /// CRC-32 of the weight file that the calibration belongs to.
     pub weights: String,
-    /// For images whose pixel spacing is known.
+    /// Curves for images of known pixel spacing.
     pub known_spacing: Probabilities,
-    /// For images of unknown pixel spacing, which are searched at more scales.
+    /// Curves for images of unknown pixel spacing, which are searched at more scales.
     pub unknown_spacing: Probabilities,
 }
 
 impl Calibration {
-    /// Where the calibration of a file of weights lies: `detector.safetensors` has `detector.calibration.json`.
+    /// Path of the calibration of a weight file: `detector.calibration.json` for `detector.safetensors`.
     #[must_use]
     pub fn path_beside(weights: &Path) -> PathBuf {
         weights.with_extension("calibration.json")
@@ -184,7 +184,7 @@ impl Calibration {
     ///
     /// # Errors
     ///
-    /// [`Error::Calibration`] for text that is no calibration, or one of other weights.
+    /// [`Error::Calibration`] for text that is not a calibration, or is the calibration of other weights.
     pub(crate) fn read(name: &Path, text: &str, weights: &str) -> Result<Self> {
         let wrong = |why: String| Error::Calibration {
             path: name.to_owned(),
@@ -202,7 +202,7 @@ impl Calibration {
 }
 
 impl Probabilities {
-    /// Puts the probabilities of a detection into it.
+    /// Sets the probabilities of a detection.
     pub(crate) fn rate(&self, one: &mut Detection) {
         one.probability = Some(self.wake.of(f64::from(one.score)) as f32);
         let forward = one.forward.map(|forward| 0.5 * (1.0 + f64::from(forward)));
@@ -215,15 +215,15 @@ mod tests {
     use super::*;
     use wake_nn::noise::NoiseSource;
 
-    /// Numbers, each right with the probability of a curve.
+    /// Uniform random numbers, each right with the probability that a curve gives it.
     fn drawn(curve: &Beta, count: u64) -> Vec<(f64, bool)> {
         let number = |stream: u32, k: u64| NoiseSource::new(5).uniform(stream, k);
         let one = |k: u64| (number(0, k), number(1, k) < curve.of(number(0, k)));
         (0..count).map(one).collect()
     }
 
-    /// 20,000 numbers have a curve that is known to √(p(1 − p)·3/n) ≈ 0.006 on average for three coefficients; five times that
-    /// at any of the numbers looked at.
+    /// With three coefficients, 20,000 numbers determine the curve to √(p(1 − p)·3/n) ≈ 0.006 on average; the tolerance at each
+    /// tested number is five times that.
     #[test]
     fn the_curve_behind_the_numbers_is_found() {
         for curve in [
@@ -252,7 +252,7 @@ mod tests {
         }
     }
 
-    /// The sum of the probabilities is the sum of the targets wherever the offset is free.
+    /// With a free offset, the probabilities sum to the sum of the targets.
     #[test]
     fn probabilities_sum_to_what_was_right() {
         let known = drawn(
@@ -271,7 +271,7 @@ mod tests {
         assert!((sum - targets).abs() < 1e-3, "{sum} {targets}");
     }
 
-    /// Nothing, one kind alone, numbers that separate, falling ones and bounds: finite, and never falling.
+    /// No numbers, one class alone, separable numbers, falling ones and the bounds 0 and 1 give finite curves that never fall.
     #[test]
     fn hard_numbers_have_a_rising_finite_curve() {
         let separable: Vec<(f64, bool)> =

@@ -19,8 +19,8 @@ use crate::wake::Detection;
 
 /// Finds ship wakes in radar images with a trained network.
 ///
-/// An image is searched at several scales, a large one in tiles that overlap; what several scales see scores higher. Grey may
-/// have any scaling: the network sees contrast in standard deviations of the speckle around.
+/// An image is searched at several scales, a large one in overlapping tiles; wakes found at several scales score higher. Grey
+/// levels may have any scaling: the input of the network is contrast in standard deviations of the local speckle.
 ///
 /// # References
 ///
@@ -29,33 +29,33 @@ use crate::wake::Detection;
 pub struct Detector {
     network: Network,
     device: Device,
-    /// CRC-32 of the file.
+    /// CRC-32 of the weight file.
     weights: String,
     calibration: Option<Calibration>,
     search: Search,
 }
 
-/// The weights that ship and their calibration.
+/// The shipped weights and their calibration.
 const NAME: &str = "detector.safetensors";
 const WEIGHTS: &[u8] = include_bytes!("../assets/detector.safetensors");
 const CALIBRATION: &str = include_str!("../assets/detector.calibration.json");
-/// Detections with lower scores are not told, unless they are asked for.
+/// Wakes with lower scores are not reported by default.
 const LEAST_SCORE: f32 = 0.03;
-/// Score from which on a detection counts as found where no calibration says one.
+/// Lowest score of a sure detection without a calibration.
 const UNCALIBRATED: f32 = 0.25;
 
 impl Detector {
-    /// The weights of this crate: the content of a safetensors file.
+    /// The shipped weights: the content of a safetensors file.
     #[must_use]
     pub fn pretrained_weights() -> &'static [u8] {
         WEIGHTS
     }
 
-    /// The network of this crate on a device.
+    /// Loads the shipped network on a device, with its calibration.
     ///
     /// # Errors
     ///
-    /// [`Error::Model`](crate::Error::Model) where the weights do not fit in memory, and for a device that is no CPU and fails
+    /// [`Error::Model`](crate::Error::Model) if the weights do not fit in memory, or if a device other than a CPU fails
     /// [`check_device`](crate::self_check::check_device).
     pub fn pretrained(device: &Device) -> Result<Self> {
         let mut detector = Self::uncalibrated(None, device)?;
@@ -64,12 +64,12 @@ impl Detector {
         Ok(detector)
     }
 
-    /// The network of a file, as training writes it, after a check on one fixed image; with the calibration that lies beside the
-    /// file, if there is one ([`Calibration::path_beside`]).
+    /// Loads a network from a file written by training, after a check on one fixed image, with the calibration beside the file
+    /// if there is one ([`Calibration::path_beside`]).
     ///
     /// # Errors
     ///
-    /// [`Error::Model`](crate::Error::Model) for a file that is not there or does not fit,
+    /// [`Error::Model`](crate::Error::Model) for a file that is missing or does not fit the network,
     /// [`Error::WrongMaps`](crate::Error::WrongMaps) for weights that find nothing in any image, such as equal or huge ones,
     /// [`Error::Calibration`](crate::Error::Calibration) for a calibration of other weights.
     pub fn load(file: &Path, device: &Device) -> Result<Self> {
@@ -82,13 +82,13 @@ impl Detector {
         Ok(detector)
     }
 
-    /// The network, which turns normalised pixels into maps.
+    /// The network, which maps normalised pixels to maps.
     #[must_use]
     pub fn network(&self) -> &Network {
         &self.network
     }
 
-    /// The network of a file, by default of this crate, without probabilities.
+    /// Loads a network from a file, or the shipped one for `None`, without a calibration.
     ///
     /// # Errors
     ///
@@ -123,27 +123,27 @@ impl Detector {
         })
     }
 
-    /// The same detector with another calibration; `None` for none.
+    /// Replaces the calibration; `None` removes it.
     #[must_use]
     pub fn with_calibration(mut self, calibration: Option<Calibration>) -> Self {
         self.calibration = calibration;
         self
     }
 
-    /// CRC-32 of the file of weights.
+    /// CRC-32 of the weight file.
     #[must_use]
     pub fn weights_checksum(&self) -> &str {
         &self.weights
     }
 
-    /// Score from which on a detection is sure: that of the calibration, 0.25 without one.
+    /// Lowest score of a sure detection: from the calibration, 0.25 without one.
     #[must_use]
     pub fn sure_from(&self) -> f32 {
         self.probabilities()
             .map_or(UNCALIBRATED, |found| found.sure_from)
     }
 
-    /// The probabilities of the detections, by whether the pixel spacing is known; `None` without a calibration.
+    /// Calibration curves for known or unknown pixel spacing, as this detector is set; `None` without a calibration.
     #[must_use]
     pub fn probabilities(&self) -> Option<&Probabilities> {
         let calibration = self.calibration.as_ref()?;
@@ -153,7 +153,7 @@ impl Detector {
         })
     }
 
-    /// The same detector for images whose pixels are so far apart \[m\], 0.5 to 100; without it the scale comes from the image.
+    /// Sets the pixel spacing \[m\] of the images, 0.5 to 100; by default the scale is estimated from each image.
     ///
     /// # Errors
     ///
@@ -164,7 +164,7 @@ impl Detector {
         Ok(self)
     }
 
-    /// The same detector with another least score that is told, 0 to 1, by default 0.03.
+    /// Sets the lowest score of the reported wakes, 0 to 1, by default 0.03.
     ///
     /// # Errors
     ///
@@ -175,7 +175,7 @@ impl Detector {
         Ok(self)
     }
 
-    /// The wakes of an image, the surest first; each is told once.
+    /// Returns the wakes of an image in descending order of score, without duplicates.
     #[must_use]
     pub fn find(&self, image: &GreyImage) -> Vec<Detection> {
         let Ok(found) = find(image, self, self.search);
@@ -183,24 +183,24 @@ impl Detector {
         rated.map(Detection::measured).collect()
     }
 
-    /// The wakes of one of the [`Tile`]s of an image that is read window by window, without probabilities;
-    /// [`merged`](Self::merged) puts those of all tiles together.
+    /// Returns the wakes in one [`Tile`] of an image that is read window by window, without probabilities;
+    /// [`merged`](Self::merged) combines the wakes of all tiles.
     ///
     /// # Errors
     ///
-    /// Those of [`Raster::window`].
+    /// The errors of [`Raster::window`].
     pub fn find_in<R: Raster>(&self, image: &R, tile: &Tile) -> Result<Vec<Detection>, R::Error> {
         in_tile(image, tile, self, self.search)
     }
 
-    /// The wakes of all tiles with their probabilities, each told once, the surest first, as long as the network says;
-    /// [`Detection::measured`] makes them as long as they were measured to be.
+    /// Combines the wakes of all tiles, with probabilities and without duplicates, in descending order of score. Lengths are the
+    /// network's; [`Detection::measured`] replaces them by measured ones.
     #[must_use]
     pub fn merged(&self, found: Vec<Detection>) -> Vec<Detection> {
         self.rated(merged(found))
     }
 
-    /// Detections with their probabilities, and whether they are sure.
+    /// Sets the probabilities of detections, and whether they are sure.
     fn rated(&self, mut found: Vec<Detection>) -> Vec<Detection> {
         for one in &mut found {
             one.sure = one.score >= self.sure_from();

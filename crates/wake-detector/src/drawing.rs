@@ -1,4 +1,4 @@
-//! Pictures of what was found.
+//! Pictures of detections.
 
 use image::{Rgb, RgbImage};
 
@@ -6,10 +6,10 @@ use crate::image::GreyImage;
 use crate::scaling::rescaled;
 use crate::wake::{Detection, Wake};
 
-/// No picture has longer sides \[pixels\].
+/// Longest side of a picture \[pixels\].
 const LARGEST: usize = 2048;
 
-/// A grey image with rays drawn on it.
+/// Grey image with rays drawn on it.
 #[derive(Debug, Clone)]
 pub struct Drawing {
     picture: RgbImage,
@@ -17,11 +17,11 @@ pub struct Drawing {
 }
 
 impl Drawing {
-    /// The image, darkest pixel black, the brightest hundredth white; large ones smaller.
+    /// Draws the image from black at its darkest pixel to light grey at its 99th percentile, shrunk if it is large.
     #[must_use]
     pub fn new(image: &GreyImage) -> Self {
         let factor = (LARGEST as f32 / image.rows.max(image.columns) as f32).min(1.0);
-        // Bands, so that a large image never lies in memory as numbers.
+        // In bands, so that a large image is never held in memory as floats.
         let band = ((8.0 / factor).ceil() as usize).max(1).next_multiple_of(64);
         let mut lines = Vec::new();
         let mut columns = 1;
@@ -45,7 +45,7 @@ impl Drawing {
         Self { picture, factor }
     }
 
-    /// Draws a ray from its tip to its end, beside the line so that it stays to be seen, and a mark at the tip.
+    /// Draws a ray from tip to end as two lines on both sides of the wake, which stays visible, and a mark at the tip.
     pub fn ray(&mut self, wake: &Wake, colour: [u8; 3]) {
         let [right, down] = wake.direction();
         let aside = 9.0;
@@ -64,9 +64,9 @@ impl Drawing {
         );
     }
 
-    /// Draws what was found, the surest last and reddest, unsure ones toward yellow.
+    /// Draws detections from yellow at low scores to red at high ones, the highest score on top.
     ///
-    /// - `found`: the surest first
+    /// - `found`: in descending order of score
     pub fn found<'a>(&mut self, found: impl DoubleEndedIterator<Item = &'a Detection>) {
         for one in found.rev() {
             let green = (255.0 * (1.0 - one.score.min(1.0))) as u8;
@@ -101,7 +101,7 @@ impl Drawing {
     }
 }
 
-/// Pictures of one size beside and below each other.
+/// Arranges pictures of one size in a table with this number of columns.
 #[must_use]
 pub fn sheet(pictures: &[RgbImage], columns: usize) -> RgbImage {
     let (width, height) = pictures.first().map_or((1, 1), RgbImage::dimensions);

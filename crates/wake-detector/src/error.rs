@@ -1,17 +1,17 @@
-//! The one error type of this crate.
+//! The error type of this crate.
 
 use std::path::PathBuf;
 
-/// Neither side of an image is longer \[pixels\].
+/// Longest side of an image \[pixels\].
 pub(crate) const LONGEST_SIDE: usize = 20_000;
-/// No file is longer \[bytes\].
+/// Largest size of a file \[bytes\].
 pub(crate) const LONGEST_FILE: u64 = 2_000_000_000;
-/// An image takes no more memory while it is read \[bytes\]: 20,000 × 20,000 pixels of 16 bits, and as much again.
+/// Largest memory for reading an image \[bytes\]: 20,000 × 20,000 pixels of 16 bits, and as much again.
 pub(crate) const MOST_MEMORY: u64 = 1_800_000_000;
-/// Text, colour profile and other notes of an image take no more memory \[bytes\].
+/// Largest memory for text, colour profile and other metadata of an image \[bytes\].
 pub(crate) const MOST_NOTES: u64 = 64 << 20;
 
-/// What a fallible function of this crate returns.
+/// Result of a fallible function of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 /// An image that could not be read, or a network that could not be loaded.
@@ -30,22 +30,22 @@ pub enum Error {
     #[error("{} holds no PNG, JPEG or TIFF file; name another folder", folder.display())]
     NoImages { folder: PathBuf },
 
-    /// Two images whose results nothing would tell apart.
+    /// Two images with the same name, whose results could not be distinguished.
     #[error("two images are called {name:?}; search them one after the other")]
     SameName { name: String },
 
-    /// A file that is no image.
+    /// A file that is not a readable image.
     #[error(
         "{} is no image that can be read ({why}); give a PNG, JPEG or TIFF file of 8 or 16 bits",
         path.display()
     )]
     Unreadable { path: PathBuf, why: String },
 
-    /// A file too long to be read.
+    /// A file that is too long.
     #[error("{} has {bytes} bytes, above {LONGEST_FILE}; cut it into pieces", path.display())]
     FileTooLong { path: PathBuf, bytes: u64 },
 
-    /// An image with too many pixels a side, or none.
+    /// An image with too many pixels per side, or none.
     #[error(
         "{} has {columns} x {rows} pixels, outside 1 to {LONGEST_SIDE} a side; cut it into pieces",
         path.display()
@@ -56,7 +56,7 @@ pub enum Error {
         rows: u32,
     },
 
-    /// An image that takes too much memory while it is read.
+    /// An image that needs too much memory to read.
     #[error(
         "{} takes {bytes} bytes, above {MOST_MEMORY}; convert it to grey of 8 or 16 bits",
         path.display()
@@ -73,7 +73,7 @@ pub enum Error {
         levels: usize,
     },
 
-    /// Weights whose maps of a plain wake show nothing.
+    /// Weights that give unusable maps for an image with one obvious wake.
     #[error(
         "the weights in {} on {device} give maps that are {why} for an image with one plain wake; \
          use weights that `wake train detector` has written, or the shipped ones",
@@ -85,7 +85,7 @@ pub enum Error {
         why: &'static str,
     },
 
-    /// A file that is no calibration, or one of other weights.
+    /// A file that is not a calibration, or is the calibration of other weights.
     #[error("the calibration {} cannot be used: {why}", path.display())]
     Calibration { path: PathBuf, why: String },
 

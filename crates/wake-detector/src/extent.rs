@@ -1,18 +1,18 @@
-//! The end of a wake's line, with its standard deviation.
+//! Length of a wake's line, with its standard deviation.
 //!
-//! The first part of the line says what the wake looks like across its axis, beside it lies sea, and the likelihood of every place says
-//! whether the line goes on to it.
+//! The first part of the line gives the profile of the wake across its axis, strips beside it give the noise of the sea, and the
+//! likelihood decides how far the line continues.
 //!
 //! ```text
 //! s_k = Σ_c p(c) z_k(c) / |p|                                   contrast of block k along the profile p of the first part
 //! ln L(n) = Σ_{k<n} (s_k m − m²/2)/σ²                           the line ends behind block n; σ² from the same sums beside it
 //! ```
 //!
-//! z is the contrast in standard deviations of the speckle, m the mean of s on the first part, and a share of m from there on: wakes
-//! fade. The profile is smoothed, shrunk to where it stands out of its noise, and has mean zero, so that mottle as wide as the strip
-//! adds nothing; on the first part each block is compared with the profile of the others. The length is the mean of the posterior over
-//! n, the shares of m and small turns of the axis; its standard deviation is that of the posterior, with a share of the length for
-//! wakes that fade.
+//! z is the contrast in standard deviations of the speckle. m is the mean of s on the first part, and a share of it beyond,
+//! because wakes fade. The profile is smoothed, shrunk toward zero where it does not exceed its noise, and has mean zero, so
+//! that mottle as wide as the strip cancels; on the first part, each block is compared with the profile of the others. The
+//! length is the posterior mean over n, the shares of m and small turns of the axis; its standard deviation is that of the
+//! posterior, plus a share of the length for wakes that fade.
 //!
 //! # References
 //!
@@ -20,32 +20,32 @@
 
 use crate::wake::{Extent, Wake};
 
-/// Length of a block along the axis, half the width of a profile, and the longest line in blocks \[units\].
+/// Length of a block along the axis and half the width of a profile \[units\], and the longest line \[blocks\].
 const BLOCK: usize = 6;
 const REACH: usize = 26;
 const LONGEST: usize = 120;
-/// Blocks at the tip that are left out for the ship.
+/// Blocks at the tip that are skipped because of the ship.
 const SHIP: usize = 2;
-/// Fewest and most blocks before which a profile is taken.
+/// Fewest and most blocks of the first part, from which the profile is taken.
 const FIRST: [usize; 2] = [7, 16];
-/// Lanes beside the axis that are sea, in half-widths of a profile.
+/// Offsets from the axis of the strips of sea beside it, in half-widths of a profile.
 const LANES: [isize; 4] = [-3, -2, 2, 3];
-/// Farthest column from the axis: the outer lanes, and the axis turned.
+/// Largest distance of a column from the axis, enough for the outer lanes of a turned axis.
 const SIDE: isize = 146;
-/// Turns of the axis that are tried, their step and standard deviation \[deg\].
+/// Number of turns of the axis tried to each side, their step and prior standard deviation \[deg\].
 const TURNS: i32 = 4;
 const TURN_STEP: f64 = 0.75;
 const TURN_DEVIATION: f64 = 1.5;
-/// Contrast behind the first part over the contrast on it, all as likely.
+/// Ratios of the contrast beyond the first part to the contrast on it, all equally likely.
 const SHARES: [f64; 5] = [0.25, 0.4, 0.6, 0.8, 1.0];
-/// Standard deviation of the logarithm of the network's length.
+/// Standard deviation of the log-normal prior about the network's length.
 const PRIOR: f64 = 0.8;
-/// Standard deviation of smoothing across the axis, and values of a smoothed profile that are one \[columns\].
+/// Standard deviation of the smoothing across the axis, and effective number of values it averages \[columns\].
 const SMOOTH: f64 = 1.5;
 const TOGETHER: f64 = 2.6;
-/// Standard deviation of the end of wakes that fade, as a share of the length.
+/// Standard deviation of the end of a fading wake, as a share of the length.
 const FADE: f64 = 0.08;
-/// Contrast beyond these bounds is a ship.
+/// Contrast is clamped to ±this; higher contrast is a ship.
 const BOUND: f32 = 4.0;
 
 /// An image in standard deviations of its speckle, `[rows, columns]`.
@@ -54,15 +54,15 @@ pub(crate) struct Surroundings<'a> {
     pub(crate) contrast: &'a [f32],
     pub(crate) rows: usize,
     pub(crate) columns: usize,
-    /// Pixels of a unit of length: 1 where neighbouring pixels have speckle of their own, more where it is correlated.
+    /// Unit of length \[pixels\]: 1 where the speckle of neighbouring pixels is independent, more where it is correlated.
     pub(crate) unit: f32,
 }
 
-/// Means of the contrast over the blocks of the axis, by columns beside it: `[blocks, 2·SIDE + 1]`, NaN outside the image.
+/// Mean contrast by block along the axis and column across it: `[blocks, 2·SIDE + 1]`, NaN outside the image.
 struct Strip(Vec<[f64; 2 * SIDE as usize + 1]>);
 
 impl Surroundings<'_> {
-    /// The end of the line of a wake; `None` where too little of it lies in the image, or nothing of it stands out.
+    /// Estimates the length of a wake's line; `None` if too little of it lies in the image, or nothing of it exceeds the noise.
     pub(crate) fn extent(&self, wake: &Wake) -> Option<Extent> {
         let strip = self.strip(wake);
         let told = f64::from(wake.length / self.unit).max(BLOCK as f64);
@@ -122,7 +122,7 @@ impl Surroundings<'_> {
         Strip((0..LONGEST).map(block).collect())
     }
 
-    /// The contrast at a place between pixels, within bounds; `None` outside the image.
+    /// Clamped contrast at a place between pixels, by bilinear interpolation; `None` outside the image.
     fn at(&self, x: f32, y: f32) -> Option<f32> {
         let inside = |at: f32, size: usize| at >= 0.0 && at <= size as f32 - 1.0;
         if !inside(x, self.columns) || !inside(y, self.rows) {
@@ -144,7 +144,7 @@ impl Surroundings<'_> {
 }
 
 impl Strip {
-    /// A lane of the strip along an axis that is turned, `[2·REACH + 1]` of a block; `None` where it leaves the image.
+    /// One block of a lane along a turned axis, `[2·REACH + 1]`; `None` where it leaves the image.
     fn lane(&self, block: usize, turn: f64, lane: isize) -> Option<&[f64]> {
         let along = (block as f64 + 0.5) * BLOCK as f64;
         let shift = (turn.to_radians().tan() * along).round() as isize;
@@ -159,9 +159,9 @@ impl Strip {
             .then_some(values)
     }
 
-    /// Log-likelihood that the line ends behind each block, by their number; `None` where there is no profile.
+    /// Log-likelihood of the line's length, by number of blocks; `None` without a profile.
     ///
-    /// - `told`: length that the network says \[units\]
+    /// - `told`: length given by the network \[units\]
     fn likelihood(&self, turn: f64, told: f64) -> Option<Vec<f64>> {
         let line: Vec<&[f64]> = (0..LONGEST).map_while(|k| self.lane(k, turn, 0)).collect();
         let first = ((told / BLOCK as f64) as usize)
@@ -224,7 +224,7 @@ impl Strip {
     }
 }
 
-/// The profile of a sum of `count` blocks, of length 1: smoothed, without its mean, shrunk; `None` where nothing stands out.
+/// Profile from a sum of `count` blocks: smoothed, mean removed, shrunk, of unit norm; `None` if nothing exceeds the noise.
 ///
 /// - `noise`: variance of one value of a block
 fn profile(total: &[f64; 2 * REACH + 1], count: usize, noise: f64) -> Option<[f64; 2 * REACH + 1]> {
@@ -264,7 +264,7 @@ fn variance(values: impl Iterator<Item = f64>) -> f64 {
     (second / count - (first / count).powi(2)).max(0.0)
 }
 
-/// Variance of a value in a sum of many that follow each other: with the correlation of the next three.
+/// Variance per value of a sum of consecutive values, with their correlation up to a lag of three.
 fn correlated_variance(values: &[f64]) -> f64 {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
@@ -292,7 +292,7 @@ mod tests {
     const ROWS: usize = 220;
     const COLUMNS: usize = 620;
 
-    /// White noise with a line from (60, 110) to the right: depth in standard deviations, 7 columns wide.
+    /// White noise with a dark line from (60, 110) to the right, 7 rows wide; depth in standard deviations.
     fn painted(seed: u64, length: f32, depth: f32) -> Vec<f32> {
         let mut image = NoiseSource::new(seed).normal(0, ROWS * COLUMNS);
         for row in 107..=113 {
@@ -328,8 +328,8 @@ mod tests {
         })
     }
 
-    /// Lines of 60 to 480 pixels that a network says are 100 long: a block of 6 × 7 pixels of depth 0.6 stands out by 3.9 standard
-    /// deviations, so that the end is known to a block and a half; the axis is off by a degree, the tip by 3 pixels.
+    /// Lines of 60 to 480 pixels for which the network gives 100: a block of 6 × 7 pixels of depth 0.6 exceeds the noise by 3.9
+    /// standard deviations, so the end is located to a block and a half; the axis is off by a degree, the tip by 3 pixels.
     #[test]
     fn lines_are_followed_to_their_end() {
         for (n, length) in [60.0, 100.0, 180.0, 300.0, 480.0].into_iter().enumerate() {
@@ -344,7 +344,7 @@ mod tests {
         }
     }
 
-    /// The deviation is honest: of faint lines too, about two thirds lie within it, at least half of 24.
+    /// The deviation is honest for faint lines too: about two thirds lie within it; at least half of 24 must.
     #[test]
     fn the_deviation_holds_two_thirds() {
         let within = (0..24).filter(|&seed| {
@@ -355,7 +355,7 @@ mod tests {
         assert!(within.count() >= 12);
     }
 
-    /// A fainter line has a wider end.
+    /// The end of a fainter line is less certain.
     #[test]
     fn faint_lines_are_less_certain() {
         let mean = |depth: f32| -> f32 {
@@ -381,7 +381,7 @@ mod tests {
         assert!((500.0..=560.0).contains(&found.length), "{found:?}");
     }
 
-    /// Where speckle is correlated the same line is as long in pixels, in larger blocks.
+    /// With correlated speckle, a line has the same length in pixels, measured in larger blocks.
     #[test]
     fn lengths_are_in_pixels_of_the_image() {
         let image = painted(3, 240.0, 0.9);
@@ -396,7 +396,7 @@ mod tests {
         assert!((found.length - 240.0).abs() < 30.0, "{found:?}");
     }
 
-    /// Nothing is invented where nothing can be measured, and nothing panics.
+    /// Where nothing can be measured, the result is `None`, without a panic.
     #[test]
     fn hard_images_have_no_end() {
         let flat = vec![0.0; ROWS * COLUMNS];

@@ -1,16 +1,16 @@
-//! The images of files and folders, and the names of their results.
+//! Image files in lists and folders, and the names of their results.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 
-/// Endings of files that are read.
+/// Extensions of image files.
 const ENDINGS: [&str; 5] = ["png", "jpg", "jpeg", "tif", "tiff"];
 /// Suffix of pictures of wakes, after the name of the image.
 const PICTURE: &str = ".wakes.png";
 
-/// Name of an image in results, unique among those of [`image_files`]: its file name, with bytes that are no UTF-8 as `\xFF`.
+/// Name of an image in results, unique among [`image_files`]: its file name, with bytes that are not UTF-8 as `\xFF`.
 #[must_use]
 pub fn image_name(image: &Path) -> String {
     let name = image.file_name().unwrap_or_default().as_encoded_bytes();
@@ -24,7 +24,7 @@ pub fn image_name(image: &Path) -> String {
     told
 }
 
-/// File name of the picture of an image's wakes: the whole name of the image and `.wakes.png`, so `a.png` and `a.tif` have different ones.
+/// File name of the picture of an image's wakes: the image's full name and `.wakes.png`, so `a.png` and `a.tif` do not collide.
 #[must_use]
 pub fn picture_name(image: &Path) -> OsString {
     let mut name = image.file_name().unwrap_or_default().to_owned();
@@ -32,13 +32,13 @@ pub fn picture_name(image: &Path) -> OsString {
     name
 }
 
-/// The images that a list of files and folders names, in order. Files are not opened.
+/// Lists the images of files and folders, in order, without opening them.
 ///
-/// The images of a folder are its PNG, JPEG and TIFF files by name, without pictures of wakes ([`picture_name`]).
+/// The images of a folder are its PNG, JPEG and TIFF files sorted by name, except pictures of wakes ([`picture_name`]).
 ///
 /// # Errors
 ///
-/// [`Error::NoImages`] for a folder without any, [`Error::SameName`] for two files of one [`image_name`], and [`Error::Io`].
+/// [`Error::NoImages`] for a folder without images, [`Error::SameName`] for two files with one [`image_name`], and [`Error::Io`].
 pub fn image_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for path in paths {
@@ -116,7 +116,7 @@ mod tests {
         std::fs::write(&picture, "").unwrap();
         let found = image_files(&[folder.path().to_owned()]).unwrap();
         assert_eq!(found, [path("a.png")]);
-        // Who names it means it.
+        // A picture that is named explicitly is searched.
         assert_eq!(
             image_files(std::slice::from_ref(&picture)).unwrap(),
             [picture]

@@ -1,11 +1,11 @@
-//! What finds wakes in images: the trained network, the classical transform, or a method of your own.
+//! Common interface of methods that find wakes: the trained network, the classical transform, or your own.
 
 use crate::detector::Detector;
 use crate::image::GreyImage;
 use crate::radon;
 use crate::wake::Detection;
 
-/// Something that finds wakes.
+/// A method that finds wakes in images.
 ///
 /// ```
 /// use wake_detector::{Detection, Finder, GreyImage, Radon};
@@ -24,7 +24,7 @@ use crate::wake::Detection;
 /// # Ok::<(), wake_detector::Error>(())
 /// ```
 pub trait Finder: Sync {
-    /// The wakes of an image, the surest first.
+    /// Returns the wakes of an image in descending order of score.
     fn find(&self, image: &GreyImage) -> Vec<Detection>;
 }
 
@@ -34,7 +34,7 @@ impl Finder for Detector {
     }
 }
 
-/// The classical method, see [`radon::find`].
+/// The classical method; see [`radon::find`].
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Radon;
 

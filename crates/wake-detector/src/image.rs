@@ -9,7 +9,7 @@ use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Li
 
 use crate::error::{Error, LONGEST_FILE, LONGEST_SIDE, MOST_MEMORY, MOST_NOTES, Result};
 
-/// Levels as the file has them: a large image takes no more memory than it must.
+/// Grey levels at the bit depth of the file, to save memory.
 #[derive(Debug, Clone)]
 enum Levels {
     Eight(Vec<u8>),
@@ -29,8 +29,8 @@ impl GreyImage {
     ///
     /// # Errors
     ///
-    /// [`Error::Unreadable`] for what is no image or no regular file, [`Error::FileTooLong`], [`Error::TooLarge`] and
-    /// [`Error::TooMuchMemory`] for one that is too large; that is found out before the pixels are read.
+    /// [`Error::Unreadable`] for a path that is not an image or not a regular file; [`Error::FileTooLong`], [`Error::TooLarge`]
+    /// and [`Error::TooMuchMemory`] for an image that is too large, before its pixels are read.
     pub fn read(path: &Path) -> Result<Self> {
         let mut decoder = decoder(path)?;
         let wrong = |error: ImageError| unreadable(path, error);
@@ -60,16 +60,16 @@ impl GreyImage {
         })
     }
 
-    /// An image of 8 bits from its levels, row by row.
+    /// Makes an 8-bit image from its levels, row by row.
     ///
     /// # Errors
     ///
-    /// [`Error::WrongSize`] when they do not fill it, or it has no pixels.
+    /// [`Error::WrongSize`] if the levels do not fill the image, or it has no pixels.
     pub fn eight_bits(rows: usize, columns: usize, levels: Vec<u8>) -> Result<Self> {
         Self::of(rows, columns, levels.len(), Levels::Eight(levels))
     }
 
-    /// An image of 16 bits from its levels, row by row.
+    /// Makes a 16-bit image from its levels, row by row.
     ///
     /// # Errors
     ///
@@ -105,11 +105,11 @@ impl GreyImage {
         self.columns
     }
 
-    /// A rectangle as numbers, row by row.
+    /// Returns the levels of a rectangle, row by row.
     ///
     /// # Panics
     ///
-    /// If it does not lie in the image.
+    /// If the rectangle does not lie in the image.
     #[must_use]
     pub fn window(&self, top: usize, left: usize, rows: usize, columns: usize) -> Vec<f32> {
         let mut window = Vec::with_capacity(rows * columns);
@@ -125,11 +125,11 @@ impl GreyImage {
         window
     }
 
-    /// Levels from 0 to 255, rounded to eight bits.
+    /// Makes an 8-bit image from levels of 0 to 255, which are rounded.
     ///
     /// # Panics
     ///
-    /// When there are not `rows · columns` of them.
+    /// If there are not `rows · columns` levels.
     pub fn from_levels(rows: usize, columns: usize, levels: &[f32]) -> Self {
         assert_eq!(levels.len(), rows * columns, "pixels of an image");
         let levels = levels.iter().map(|x| x.round().clamp(0.0, 255.0) as u8);
@@ -140,22 +140,32 @@ impl GreyImage {
         }
     }
 
-    /// The image rotated by a quarter clockwise.
+    /// The image rotated clockwise by 90°.
     pub fn turned(&self) -> Self {
-        let turn = |value: &dyn Fn(usize, usize) -> f32| -> Vec<f32> {
-            let places = (0..self.columns).flat_map(|r| (0..self.rows).map(move |c| (r, c)));
-            places.map(|(r, c)| value(self.rows - 1 - c, r)).collect()
-        };
-        let window = self.window(0, 0, self.rows, self.columns);
-        let levels = turn(&|row, column| window[row * self.columns + column]);
-        Self::from_levels(self.columns, self.rows, &levels)
+        let [rows, columns] = [self.rows, self.columns];
+        Self {
+            rows: columns,
+            columns: rows,
+            levels: match &self.levels {
+                Levels::Eight(levels) => Levels::Eight(turned(levels, rows, columns)),
+                Levels::Sixteen(levels) => Levels::Sixteen(turned(levels, rows, columns)),
+            },
+        }
     }
 }
 
-/// Opens a file and reads what lies before its pixels: a colour profile above [`MOST_NOTES`] is left out, longer text refused.
+/// Rotates levels clockwise by 90°.
+fn turned<T: Copy>(levels: &[T], rows: usize, columns: usize) -> Vec<T> {
+    let places = (0..columns).flat_map(|column| (0..rows).rev().map(move |row| (row, column)));
+    places
+        .map(|(row, column)| levels[row * columns + column])
+        .collect()
+}
+
+/// Opens a file and reads its header: a colour profile above [`MOST_NOTES`] is ignored, longer text refused.
 fn decoder(path: &Path) -> Result<impl ImageDecoder> {
     let io = |error: std::io::Error| unreadable(path, error);
-    // Opening a pipe would wait for somebody to write into it.
+    // Opening a pipe would block until something writes to it.
     let found = std::fs::metadata(path).map_err(io)?;
     if !found.is_file() {
         return Err(unreadable(path, "no regular file"));
@@ -172,7 +182,7 @@ fn decoder(path: &Path) -> Result<impl ImageDecoder> {
         .with_guessed_format()
         .map_err(io)?;
     if reader.format() == Some(ImageFormat::Jpeg) {
-        // It is read as a whole, and its notes are copied, then joined.
+        // The decoder reads the whole file, copies its metadata and joins the copies.
         check_memory(path, 3 * bytes)?;
     }
     reader.limits(limits(MOST_NOTES));
@@ -226,9 +236,10 @@ mod tests {
             grey.window(1, 2, 2, 3),
             [2001.0, 3001.0, 4001.0, 2002.0, 3002.0, 4002.0]
         );
-        // A quarter clockwise: the first column becomes the first row, its last pixel first.
+        // Clockwise by 90°: the first column becomes the first row, its last pixel first.
         let turned = GreyImage::from_levels(2, 3, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).turned();
         assert_eq!(turned.window(0, 0, 3, 2), [4.0, 1.0, 5.0, 2.0, 6.0, 3.0]);
+        assert_eq!(grey.turned().window(4, 0, 1, 3), [4002.0, 4001.0, 4000.0]);
     }
 
     #[test]
@@ -265,7 +276,7 @@ mod tests {
                 "{sentence}"
             );
         }
-        // A header that claims 30,000 x 30,000 pixels; the sum over it is that of the claim.
+        // A header that claims 30,000 x 30,000 pixels, with a matching checksum.
         let mut claims = good.clone();
         claims[16..20].copy_from_slice(&30_000u32.to_be_bytes());
         claims[20..24].copy_from_slice(&30_000u32.to_be_bytes());
@@ -276,7 +287,7 @@ mod tests {
             sentence.contains("30000 x 30000") && sentence.contains("20000"),
             "{sentence}"
         );
-        // A file of more than two billion bytes, without a byte on the disk.
+        // A sparse file of more than two billion bytes.
         File::create(&path)
             .and_then(|file| file.set_len(LONGEST_FILE + 1))
             .expect("a file");
@@ -291,18 +302,18 @@ mod tests {
         [&length, &named[..], &crc(&named).to_be_bytes()].concat()
     }
 
-    /// An image of 40 × 40 pixels with a chunk more behind its header.
+    /// An image of 40 × 40 pixels with an extra chunk after its header.
     fn with_chunk(chunk: &[u8]) -> Vec<u8> {
         let mut good = std::io::Cursor::new(Vec::new());
         image::GrayImage::new(40, 40)
             .write_to(&mut good, ImageFormat::Png)
             .expect("a PNG");
         let good = good.into_inner();
-        // Mark and header take 33 bytes.
+        // Signature and header take 33 bytes.
         [&good[..33], chunk, &good[33..]].concat()
     }
 
-    /// Zeros packed by zlib, 2,064 in 13 bytes: behind the first each is a copy of 258 from one place back.
+    /// Zeros compressed by zlib, 2,064 in 13 bytes: after the first, each code copies 258 bytes from one byte back.
     fn packed_zeros(blocks: usize) -> Vec<u8> {
         let mut bits: Vec<u8> = vec![1, 1, 0, 0, 0, 1, 1, 0, 0, 0, 0];
         let copy = [1, 1, 0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0];
@@ -314,7 +325,7 @@ mod tests {
         [&[0x78, 0x01], &packed[..], &sum.to_be_bytes()].concat()
     }
 
-    /// A profile of 206 MB in 1.3 MB: the image is read without it. One of 206 kB is kept.
+    /// An image with a profile of 206 MB, compressed to 1.3 MB, is read without the profile; one of 206 kB is kept.
     #[test]
     fn a_long_colour_profile_is_not_unpacked() {
         let folder = tempfile::tempdir().expect("a folder");
@@ -331,7 +342,7 @@ mod tests {
         }
     }
 
-    /// Text of a gigabyte in a PNG, segments of a gigabyte in a JPEG, without a byte on the disk: both are refused before.
+    /// A PNG with a gigabyte of text and a JPEG with a gigabyte of segments, both sparse files, are refused before they are read.
     #[test]
     fn long_text_is_refused_before_it_is_read() {
         let folder = tempfile::tempdir().expect("a folder");
@@ -353,7 +364,7 @@ mod tests {
         assert!(sentence.contains("takes 3000000000 bytes"), "{sentence}");
     }
 
-    /// Waiting for somebody who writes into a pipe would never end.
+    /// Reading a pipe without a writer would block forever.
     #[cfg(unix)]
     #[test]
     fn pipes_and_devices_are_refused_at_once() {

@@ -1,9 +1,9 @@
-//! Maps of the network become wakes.
+//! Decodes the network's maps into wakes.
 
 use crate::network::{ANGLE_UNIT, LENGTH_UNIT, Map, OUTPUTS, STRIDE};
 use crate::wake::{Detection, Wake, angle_of, direction};
 
-/// Maps of one image, `[OUTPUTS, rows, columns]`; the first two hold probabilities.
+/// Network maps of one image, `[OUTPUTS, rows, columns]`; the first two are probabilities.
 #[derive(Debug, Clone)]
 pub(crate) struct Maps {
     pub(crate) rows: usize,
@@ -11,28 +11,28 @@ pub(crate) struct Maps {
     values: Vec<f32>,
 }
 
-/// Tips below this probability are not looked at.
+/// Tips below this probability are ignored.
 const LEAST_TIP: f32 = 0.02;
-/// A tip is the highest within so many cells.
+/// A tip is the maximum within this distance \[cells\].
 const APART: usize = 2;
-/// No image has more tips that are looked at.
+/// Largest number of tips examined per image.
 const MOST_TIPS: usize = 300;
-/// How far the axis may turn from the direction at the tip, and by which steps \[deg\].
+/// Largest turn of the axis from the direction at the tip, and the step of the search \[deg\].
 const TURN: f32 = 24.0;
 const TURN_STEP: f32 = 1.5;
-/// The ray begins so far from the tip \[cells\]: a ship may lie on its first part.
+/// First part of a ray that is skipped because a ship may lie on it \[cells\].
 const SKIPPED: usize = 2;
-/// Rays shorter than this lose support \[cells\].
+/// Added to the length in the mean along a ray, so that short rays have less support \[cells\].
 const SHORT: f32 = 5.0;
-/// No ray is followed further \[cells\].
+/// Longest ray that is followed \[cells\].
 const LONGEST: usize = 90;
 
 impl Maps {
-    /// Maps of logits and values as the network gives them.
+    /// Makes maps from the network's output, converting logits to probabilities.
     ///
     /// # Panics
     ///
-    /// When there are not `OUTPUTS · rows · columns` numbers.
+    /// If there are not `OUTPUTS · rows · columns` numbers.
     pub(crate) fn new(rows: usize, columns: usize, mut values: Vec<f32>) -> Self {
         assert_eq!(
             values.len(),
@@ -49,7 +49,7 @@ impl Maps {
         }
     }
 
-    /// The upper left of the maps.
+    /// Crops the maps to their upper left part.
     pub(crate) fn cut_to(&self, rows: usize, columns: usize) -> Self {
         let lines = self.values.chunks_exact(self.columns).enumerate();
         let inside = lines.filter(|(i, _)| i % self.rows < rows);
@@ -69,14 +69,14 @@ impl Maps {
         &self.values[map as usize * area..][..area]
     }
 
-    /// The wakes, the surest first.
+    /// Wakes in descending order of score.
     pub(crate) fn detections(&self) -> Vec<Detection> {
         let mut found: Vec<Detection> = self.tips().into_iter().map(|at| self.wake(at)).collect();
         found.sort_by(|a, b| b.score.total_cmp(&a.score));
         found
     }
 
-    /// Cells that are the highest of their neighbourhood; of equal ones the first.
+    /// Cells that are the maximum of their neighbourhood; of equal cells, the first.
     fn tips(&self) -> Vec<usize> {
         let tip = self.map(Map::Tip);
         let highest = |i: usize| {
@@ -94,7 +94,7 @@ impl Maps {
         tips
     }
 
-    /// The wake that begins in a cell: the ray near its direction that has most support.
+    /// The wake whose tip is in a cell, with the axis that fits the lines best near the cell's direction.
     fn wake(&self, at: usize) -> Detection {
         let cell = [(at % self.columns) as f32, (at / self.columns) as f32];
         let first = angle_of([self.map(Map::TipRight)[at], self.map(Map::TipDown)[at]]);
@@ -105,7 +105,7 @@ impl Maps {
             .collect();
         let best = |k: usize| supports.iter().map(|s| s.1[k]).fold(0.0, f32::max);
         let [support, longest] = [best(0), best(1)];
-        // The axis is the mean of the rays with most line on them: the line as a whole, not its beginning, says where.
+        // The axis is the mean of the rays weighted by the line along their whole length, not only its beginning.
         let (mut pull, mut total) = (0.0, 1e-6);
         for (angle, [_, whole]) in &supports {
             let weight = (whole / longest.max(1e-6)).max(0.0).powi(8);
@@ -130,7 +130,7 @@ impl Maps {
         }
     }
 
-    /// Mean agreement of the lines on a ray with its direction, weighted with how much line there is.
+    /// Mean agreement of line directions along a ray with the ray, weighted by the probability of a line.
     fn forward(&self, cell: [f32; 2], angle: f32) -> f32 {
         let [right, down] = direction(angle);
         let (mut sum, mut total) = (0.0, 1e-6);
@@ -142,7 +142,7 @@ impl Maps {
         sum / total
     }
 
-    /// The cells of a ray from behind its tip to the border.
+    /// Cells of a ray from behind the ship to the border.
     fn cells(&self, [x, y]: [f32; 2], angle: f32) -> impl Iterator<Item = usize> + use<> {
         let [right, down] = direction(angle);
         let (rows, columns) = (self.rows, self.columns);
@@ -156,8 +156,8 @@ impl Maps {
         (SKIPPED..LONGEST).map_while(cell)
     }
 
-    /// How much of a ray is a line that runs its way: the best mean over its first part, short ones at a loss; and the
-    /// sum over all of it.
+    /// Support of a ray by lines in its direction: the highest mean over a first part, lower for short parts, and the sum
+    /// over the whole ray.
     fn support(&self, cell: [f32; 2], angle: f32) -> [f32; 2] {
         let [right, down] = direction(angle);
         let (line, to_right, to_down) = (
@@ -177,9 +177,9 @@ impl Maps {
     }
 }
 
-/// Wakes that are one are told once: a weaker one goes where a stronger one lies along the same line.
+/// Removes duplicates: a wake is dropped if one with a higher score lies along the same line.
 ///
-/// - `near`: tips closer than this are one where the axes agree within [`SAME_AXIS`] \[pixels\]
+/// - `near`: tips closer than this \[pixels\] are the same if the axes agree within [`SAME_AXIS`]
 pub(crate) fn without_repeats(mut found: Vec<Detection>, near: f32) -> Vec<Detection> {
     found.sort_by(|a, b| {
         let places = |d: &Detection| (d.wake.tip[1], d.wake.tip[0]);
@@ -201,19 +201,19 @@ pub(crate) fn without_repeats(mut found: Vec<Detection>, near: f32) -> Vec<Detec
     kept
 }
 
-/// Axes of one wake differ by less \[deg\].
+/// Largest difference between the axes of duplicates \[deg\].
 const SAME_AXIS: f32 = 30.0;
-/// Lines of one wake lie closer \[pixels\].
+/// Largest distance between the lines of duplicates \[pixels\].
 const SAME_LINE: f32 = 16.0;
-/// How far one tip of it may lie behind another, or before it, in units of what is near: further on another ship may
-/// follow.
+/// How far the tip of a duplicate may lie ahead of the other tip or behind it, in units of `near`: farther behind, another
+/// ship may follow.
 const HIDDEN: f32 = 2.5;
 const FOLLOWING: f32 = 5.0;
 
-/// The axis of a wake that is followed from its end differs from the opposite one by less \[deg\].
+/// Largest difference between opposite axes of a wake that is followed both ways \[deg\].
 const OPPOSITE: f32 = 15.0;
 
-/// Whether a weaker wake is a stronger one, followed from its end to its tip: a line begins once.
+/// Whether a weaker wake is a stronger one followed from end to tip: a line has one tip.
 fn reversed(strong: &Wake, weak: &Wake, near: f32) -> bool {
     let turn = (strong.axis_deg - weak.axis_deg).rem_euclid(360.0) - 180.0;
     let (dx, dy) = (weak.tip[0] - strong.tip[0], weak.tip[1] - strong.tip[1]);
@@ -224,7 +224,7 @@ fn reversed(strong: &Wake, weak: &Wake, near: f32) -> bool {
         && (0.0..strong.length + HIDDEN * near).contains(&along)
 }
 
-/// Whether a weaker wake is a stronger one again.
+/// Whether a weaker wake is a duplicate of a stronger one.
 pub(crate) fn same(strong: &Wake, weak: &Wake, near: f32) -> bool {
     let turn = (strong.axis_deg - weak.axis_deg + 180.0).rem_euclid(360.0) - 180.0;
     let (dx, dy) = (weak.tip[0] - strong.tip[0], weak.tip[1] - strong.tip[1]);
@@ -236,7 +236,7 @@ pub(crate) fn same(strong: &Wake, weak: &Wake, near: f32) -> bool {
     }
     let [right, down] = strong.direction();
     let (along, across) = (dx * right + dy * down, dy * right - dx * down);
-    // A ship, or a bright beginning, may hide where the line begins.
+    // A ship or a bright first part may hide the start of the line.
     let follows = strong.length.clamp(near, FOLLOWING * near);
     let beside = across.abs() < SAME_LINE && (-HIDDEN * near..follows).contains(&along);
     dx.hypot(dy) < near || beside
@@ -247,7 +247,7 @@ pub(crate) fn same(strong: &Wake, weak: &Wake, near: f32) -> bool {
 mod tests {
     use super::*;
 
-    /// Maps of some rays, as sure as can be.
+    /// Maps with high probabilities along given rays.
     fn drawn(cells: usize, wakes: &[Wake]) -> Maps {
         let mut values = vec![0.0; OUTPUTS * cells * cells];
         values[..2 * cells * cells].fill(-12.0);
@@ -284,7 +284,7 @@ mod tests {
         }
     }
 
-    /// Two wakes that cross are both found where they were drawn, equal ones in a fixed order.
+    /// Two wakes that cross are both found where they were drawn.
     #[test]
     fn crossing_wakes_are_both_found() {
         let drawn_wakes = [wake([41.5, 61.5], 90.0), wake([101.5, 21.5], 180.0)];
@@ -301,7 +301,7 @@ mod tests {
         }
     }
 
-    /// A line that runs the other way supports nothing.
+    /// A line in the opposite direction gives no support.
     #[test]
     fn a_line_of_the_wrong_direction_is_no_support() {
         let mut maps = drawn(64, &[wake([41.5, 61.5], 90.0)]);
@@ -321,8 +321,8 @@ mod tests {
         assert!(before > 0.6 && after < 0.05, "{before} {after}");
     }
 
-    /// A wake from (100, 100) to the right for 120 pixels: from its end back it is the same line; a ship that comes the other way on
-    /// another line, or beyond the end, is another one.
+    /// A wake of 120 pixels to the right of (100, 100) followed from its end is the same line; a wake in the opposite direction
+    /// on another line, or beyond the end, is another wake.
     #[test]
     fn a_line_that_is_followed_both_ways_is_told_once() {
         let kept = |tip: [f32; 2], axis_deg: f32| {

@@ -1,24 +1,24 @@
-//! Windows with missing pixels: land, and what lies beyond the swath.
+//! Windows with missing pixels: land, and areas beyond the swath.
 
 use crate::wake::Wake;
 
-/// Windows with a smaller share of pixels are not searched.
+/// Windows with a smaller share of valid pixels are not searched.
 const LEAST: f32 = 0.02;
-/// A wake whose line lies on missing pixels with more than this share is none.
+/// Share of missing pixels on a wake's line from which it is dropped.
 const MOST_OF_LINE: f32 = 0.5;
-/// Pixels around the tip of which most must be there: the edge of what is missing is no wake.
+/// Distance from the tip to each side within which no pixel may be missing, because edges of missing areas resemble wakes.
 const AROUND: i64 = 12;
 
-/// Which pixels of a window are missing; none, if all are there.
+/// Mask of a window's missing pixels; empty if there are none.
 #[derive(Debug)]
 pub(crate) struct Missing {
     columns: usize,
     missing: Vec<bool>,
 }
 
-/// Puts the median of the pixels that are there in the place of missing ones: an area without contrast.
+/// Replaces missing pixels by the median of the others, an area without contrast.
 ///
-/// `None` for a window of which next to nothing is there.
+/// `None` for a window with almost no valid pixels.
 pub(crate) fn filled(pixels: &mut [f32], columns: usize) -> Option<Missing> {
     if !pixels.is_empty() && pixels.iter().all(|x| x.is_finite()) {
         return Some(Missing {
@@ -42,7 +42,7 @@ pub(crate) fn filled(pixels: &mut [f32], columns: usize) -> Option<Missing> {
 }
 
 impl Missing {
-    /// Whether a wake lies where pixels are: around its tip, and along most of its line.
+    /// Whether pixels are valid around the tip of a wake and along most of its line.
     ///
     /// - `wake`: in pixels of the window
     pub(crate) fn leaves(&self, wake: &Wake) -> bool {

@@ -1,4 +1,4 @@
-//! The network: a grey image becomes maps of tips, lines and directions at a quarter of its size.
+//! The network: from a grey image to maps of tips, lines and directions at a quarter of its size.
 
 use burn::module::{Module, Param};
 use burn::nn::conv::Conv2d;
@@ -9,13 +9,13 @@ use wake_nn::patch::space_to_depth;
 use wake_nn::resample::{Downsample, Upsample};
 use wake_nn::weights::{Layout, load_bytes};
 
-/// Pixels of the image for one cell of the maps, in each direction.
+/// Image pixels per cell of the maps, in each direction.
 pub const STRIDE: usize = 4;
 /// Both sizes of an input are multiples of this: 16 pixels for a cell of the coarsest level, times the largest dilation.
 pub const MULTIPLE: usize = 64;
-/// Maps that come in: bounded contrast and logarithm of brightness.
+/// Input channels: bounded contrast and logarithm of brightness.
 pub const INPUTS: usize = 2;
-/// Maps that come out, see [`Map`].
+/// Output channels; see [`Map`].
 pub const OUTPUTS: usize = 8;
 
 /// Output channels of the network.
@@ -25,13 +25,13 @@ pub enum Map {
     Tip = 0,
     /// Logit: the line of a wake passes here.
     Line = 1,
-    /// Direction of that line from the tip along the wake: part to the right.
+    /// Direction of that line from the tip along the wake: component to the right.
     LineRight = 2,
-    /// Direction of that line from the tip along the wake: part downward.
+    /// Direction of that line from the tip along the wake: downward component.
     LineDown = 3,
-    /// Direction of the wake whose tip is here: part to the right.
+    /// Direction of the wake whose tip is here: component to the right.
     TipRight = 4,
-    /// Direction of the wake whose tip is here: part downward.
+    /// Direction of the wake whose tip is here: downward component.
     TipDown = 5,
     /// Logarithm of the visible length over [`LENGTH_UNIT`].
     Length = 6,
@@ -48,12 +48,12 @@ pub const ANGLE_UNIT: f32 = 10.0;
 const WIDTHS: [usize; 3] = [24, 48, 96];
 const GROUPS: usize = 8;
 const EPSILON: f64 = 1e-5;
-/// Dilations of the blocks at a sixteenth: they see 16 · 2 · (1 + 2 + 4 + 2) pixels to each side.
+/// Dilations of the blocks at a sixteenth; their receptive field is 16 · 2 · (1 + 2 + 4 + 2) pixels to each side.
 const DILATIONS: [usize; 4] = [1, 2, 4, 2];
-/// Chance of a tip, and of a line, in a cell that says nothing, at the start of training.
+/// Initial probability of a tip, and of a line, from the bias of the output layer.
 const RARE: f32 = 0.02;
 
-/// Two convolutions beside a shortcut, with a dilation.
+/// Residual block of two dilated convolutions.
 ///
 /// ```text
 /// y = x + conv(silu(norm(conv(silu(norm(x))))))
@@ -93,7 +93,7 @@ impl Block {
     }
 }
 
-/// A convolution of pixels `dilation` apart: the image falls into `dilation²` images that do not see each other.
+/// Dilated convolution, computed by splitting the image into `dilation²` independent images.
 fn dilated(conv: &Conv2d, x: Tensor<4>, dilation: usize) -> Tensor<4> {
     if dilation == 1 {
         return convolve(conv, x);
@@ -112,7 +112,7 @@ fn dilated(conv: &Conv2d, x: Tensor<4>, dilation: usize) -> Tensor<4> {
         .reshape([batch, channels, rows, columns])
 }
 
-/// A U-shape at strides 4, 8 and 16.
+/// U-Net at strides 4, 8 and 16.
 ///
 /// # References
 ///
@@ -138,7 +138,7 @@ pub struct Network {
 }
 
 impl Network {
-    /// A network with random weights.
+    /// Makes a network with random weights.
     pub fn new(device: &Device) -> Self {
         let [fine, middle, coarse] = WIDTHS;
         let mut head = conv3x3(fine, OUTPUTS, device);
@@ -166,11 +166,11 @@ impl Network {
         }
     }
 
-    /// The network with the weights of this crate.
+    /// Makes the network with the shipped weights.
     ///
     /// # Errors
     ///
-    /// None that a build from unchanged files can give.
+    /// None in a build from unchanged files.
     pub fn pretrained(device: &Device) -> wake_nn::Result<Self> {
         let bytes = include_bytes!("../assets/detector.safetensors");
         load_bytes(
@@ -181,7 +181,7 @@ impl Network {
         )
     }
 
-    /// The maps of a batch of images.
+    /// Computes the maps of a batch of images.
     ///
     /// # Shapes
     ///
@@ -212,7 +212,7 @@ mod tests {
     use burn::nn::conv::Conv2dConfig;
     use burn::tensor::Distribution;
 
-    /// The split into images that do not see each other is burn's own dilated convolution.
+    /// The split into independent images gives the same result as burn's dilated convolution.
     #[test]
     fn a_dilated_convolution_is_that_of_burn() {
         let device = Device::flex();
@@ -233,7 +233,7 @@ mod tests {
         }
     }
 
-    /// Below four megabytes in 32 bits, and rare tips at the start.
+    /// The network takes less than four megabytes in 32 bits and starts with rare tips.
     #[test]
     fn the_network_is_small_and_begins_with_rare_tips() {
         let device = Device::flex();
@@ -241,7 +241,7 @@ mod tests {
         assert!(network.num_params() < 1_000_000, "{}", network.num_params());
         let maps = network.forward(Tensor::zeros([1, INPUTS, 64, 128], &device));
         assert_eq!(maps.dims(), [1, OUTPUTS, 16, 32]);
-        // Only biases and the border of zeros reach the maps of a black image.
+        // An input of zeros leaves only the biases and the zero padding.
         let tips = maps.slice([0..1, 0..1, 8..9, 16..17]).into_scalar::<f32>();
         assert!(tips < -2.0, "{tips}");
     }

@@ -1,20 +1,20 @@
-//! Grey of any scaling becomes contrast in standard deviations of the speckle.
+//! Converts grey levels of any scaling to contrast in standard deviations of the speckle.
 
-/// Distance of the places where the background is measured \[pixels\], and half the window around each.
+/// Spacing of the places where the background is measured, and half the window around each \[pixels\].
 const STEP: usize = 32;
 const REACH: usize = 56;
-/// Every so many pixels are looked at, in each direction.
+/// Step of the subsampling of pixels, in each direction.
 const SKIP: usize = 3;
-/// A median deviation becomes a standard deviation of normal numbers.
+/// Ratio of standard deviation to median absolute deviation for normal noise.
 const NORMAL: f32 = 1.4826;
-/// Local spread counts at least this share of the usual one: a flat spot does not become loud.
+/// Smallest local spread as a share of the median spread, so that flat areas are not amplified.
 const LEAST: f32 = 0.3;
-/// A spread below this share of the largest level is rounding, and counts as none.
+/// Spread below this share of the largest level is rounding and set to zero.
 const ROUNDING: f32 = 1e-5;
-/// Bounds of the contrast that the network sees.
+/// Bounds of the contrast in the network's input.
 const BOUNDS: [f32; 2] = [-5.0, 6.0];
 
-/// Median and spread of the surroundings of every pixel, on a coarse lattice.
+/// Local median and spread on a coarse lattice.
 struct Background {
     rows: usize,
     columns: usize,
@@ -101,7 +101,7 @@ impl Background {
     }
 }
 
-/// The middle of some numbers, which are put into another order.
+/// Median of numbers, which are reordered.
 fn median(numbers: &mut [f32]) -> f32 {
     let middle = numbers.len() / 2;
     *numbers.select_nth_unstable_by(middle, f32::total_cmp).1
@@ -116,7 +116,7 @@ pub fn contrast(pixels: &[f32], rows: usize, columns: usize) -> Vec<f32> {
     Background::of(pixels, rows, columns).contrast(pixels, columns)
 }
 
-/// What the network sees of a contrast: itself within bounds, and the logarithm of what is far above them.
+/// Network inputs for a contrast: the contrast within bounds, and a logarithm that also resolves bright pixels above them.
 pub fn inputs(contrast: f32) -> [f32; 2] {
     let [low, high] = BOUNDS;
     [
@@ -134,7 +134,7 @@ mod tests {
         NoiseSource::new(2).normal(0, rows * columns)
     }
 
-    /// Normal noise comes out with spread 1; the median of 1,444 numbers has an error of 1.25/38, its deviation of 1.17/38.
+    /// Normal noise gets unit spread; the median of 1,444 numbers has an error of 1.25/38, the median deviation one of 1.17/38.
     #[test]
     fn noise_has_unit_spread_whatever_its_scaling() {
         let pixels = noise(200, 170);
@@ -157,7 +157,7 @@ mod tests {
         for (rows, columns) in [(1, 1), (17, 400), (64, 64)] {
             let flat = contrast(&vec![77.0; rows * columns], rows, columns);
             assert!(flat.iter().all(|&z| z.abs() < f32::MIN_POSITIVE));
-            // As it comes from another scale, with rounding.
+            // A flat image with rounding errors, as after rescaling.
             let rounded: Vec<f32> = (0..rows * columns)
                 .map(|i| 77.0 + 1e-5 * (i % 3) as f32)
                 .collect();

@@ -4,10 +4,9 @@
 //! t = Σ_k (on_k − beside_k) / (σ_n √n),    k = 1 … n pixels from a tip
 //! ```
 //!
-//! with on the mean contrast across the ray, beside the mean on both sides of it, and `σ_n` the spread of the same sum over
-//! the whole image: then t is normal where there is sea. Bright targets are masked. A ray whose sum is as far from zero
-//! as chance makes it once in so many images is a wake; around a bright target there are fewer rays, so that less is
-//! enough.
+//! where on is the mean contrast across the ray, beside the mean on both sides of it, and `σ_n` the spread of the same sum
+//! over the whole image, so that t is normal on sea. Bright targets are masked. The threshold on |t| follows from an
+//! expected number of false alarms per image; it is lower around bright targets, where there are fewer rays.
 //!
 //! # References
 //!
@@ -24,31 +23,31 @@ use crate::scaling::rescaled;
 use crate::search::{Tile, unscaled};
 use crate::wake::{Detection, Wake, direction};
 
-/// Expected false alarms an image, from the rays around targets and from all others each, at the threshold.
+/// Expected false alarms per image at the threshold, from the rays around targets and from all others each.
 const FALSE_ALARMS: f64 = 0.25;
 
-/// The transform is taken of an image of half the size: speckle is nearly independent there.
+/// Scale of the image that is transformed: at half size, speckle is nearly independent.
 const FACTOR: f32 = 0.5;
-/// Distance of the tips that are tried \[pixels of that image\].
+/// Spacing of the tips that are tried \[pixels of that image\].
 const STEP: usize = 6;
-/// Angles that are tried.
+/// Number of angles that are tried.
 const ANGLES: usize = 120;
-/// Lengths of rays \[pixels\]; the first pixels are left out.
+/// Lengths of rays, and pixels skipped at their start \[pixels\].
 const LENGTHS: [usize; 4] = [24, 48, 84, 130];
 const SKIPPED: usize = 5;
-/// Half the width of what counts as on the ray, and the distance of what counts as beside it \[pixels\].
+/// Distance from a ray to the pixels compared with it on both sides \[pixels\].
 const BESIDE: usize = 7;
-/// Contrast is cut to this, so that no pixel rules a ray.
+/// Contrast is clamped to ±this, so that no single pixel dominates a ray.
 const CUT: f32 = 2.5;
-/// A target is brighter than this, and masked with its surroundings.
+/// Lowest contrast of a target, and distance around it that is masked \[pixels\].
 const TARGET: f32 = 6.0;
 const MASK: usize = 3;
-/// A tip lies no further from its target \[pixels\].
+/// Largest distance of a tip from its target \[pixels\].
 const NEAR_TARGET: f32 = 20.0;
-/// Tips closer than this are one \[pixels of the full image\].
+/// Tips closer than this are the same \[pixels of the full image\].
 const NEAR: f32 = 60.0;
 
-/// Contrast without targets; what is masked or outside is not a number.
+/// Contrast without targets; masked pixels are NaN.
 struct Sea {
     rows: usize,
     columns: usize,
@@ -67,7 +66,7 @@ impl Sea {
             .iter()
             .map(|i| [(i % columns) as f32, (i / columns) as f32]);
         let targets = places.fold(Vec::new(), |mut apart: Vec<[f32; 2]>, [x, y]| {
-            // A target is told once; masses of them are land.
+            // Bright pixels close together are one target; hundreds of targets are land.
             if apart.len() < 400 && !apart.iter().any(|t| (t[0] - x).hypot(t[1] - y) < 10.0) {
                 apart.push([x, y]);
             }
@@ -99,9 +98,9 @@ impl Sea {
         }
     }
 
-    /// Sums along the rays from some tips, one way and the opposite one.
+    /// Sums along the rays from given tips in a direction and in the opposite one.
     ///
-    /// The image is turned so that all rays run along its lines; then running sums of a line hold those of all its rays.
+    /// The image is rotated so that all rays run along its rows; cumulative sums of each row then give the sums of all its rays.
     fn sums(&self, tips: &[[f32; 2]], [right, down]: [f32; 2]) -> Vec<[Sums; 2]> {
         let middle = [0.5 * self.columns as f32, 0.5 * self.rows as f32];
         let half = middle[0].hypot(middle[1]).ceil() as usize + BESIDE + 2;
@@ -119,7 +118,7 @@ impl Sea {
                 self.at(x, y)
             })
             .collect();
-        // Sum and number of the known steps before each pixel of a line.
+        // Sum and number of the valid steps before each pixel of a line.
         let mut before = vec![(0.0f32, 0u32); size * (size + 1)];
         for line in BESIDE + 1..size - BESIDE - 1 {
             let row = |l: usize| &turned[l * size..][..size];
@@ -172,12 +171,12 @@ impl Sea {
     }
 }
 
-/// For each of [`LENGTHS`] the sum along a ray over the root of how many pixels it has; `None` where less than three
-/// quarters of them are known.
+/// For each of [`LENGTHS`], the sum along a ray over the root of its number of valid pixels; `None` if less than three
+/// quarters of the pixels are valid.
 type Sums = [Option<f32>; LENGTHS.len()];
 
-/// The wakes of an image, the surest first; the score is −log₁₀ of the expected number of such rays in an image of
-/// sea, beyond that of the threshold.
+/// Returns the wakes of an image in descending order of score; the score is log₁₀ of the false alarms expected per image at
+/// the threshold over those expected at the strength of the ray.
 #[must_use]
 pub fn find(image: &GreyImage) -> Vec<Detection> {
     let tiles = Tile::all(image.rows, image.columns);
@@ -194,7 +193,7 @@ pub fn find(image: &GreyImage) -> Vec<Detection> {
     without_lines_twice(without_repeats(found.collect(), NEAR))
 }
 
-/// Of rays along one line only the surest is kept: it can be followed both ways, but begins only once.
+/// Keeps only the highest score of rays along one line, which can be followed both ways but has one tip.
 fn without_lines_twice(found: Vec<Detection>) -> Vec<Detection> {
     let mut kept: Vec<Detection> = Vec::new();
     for one in found {
@@ -219,7 +218,7 @@ fn without_lines_twice(found: Vec<Detection>) -> Vec<Detection> {
     kept
 }
 
-/// The wakes of a tile, in pixels of the transform; `tiles` of them make an image.
+/// The wakes of a tile, in pixels of the transform; `tiles` is the number of tiles in the image.
 fn in_sea(sea: &Sea, tiles: usize) -> Vec<Detection> {
     let tips: Vec<[f32; 2]> = (0..sea.rows.div_ceil(STEP))
         .flat_map(|r| {
@@ -230,7 +229,7 @@ fn in_sea(sea: &Sea, tiles: usize) -> Vec<Detection> {
         .into_par_iter()
         .map(|k| sea.sums(&tips, direction(360.0 * k as f32 / ANGLES as f32)))
         .collect();
-    // Of a tip, the sums of all angles.
+    // Sums of a tip at an angle.
     let sums = |tip: usize, k: usize| half_turn[k % (ANGLES / 2)][tip][k / (ANGLES / 2)];
     let spreads: [f32; LENGTHS.len()] = std::array::from_fn(|n| {
         let all = half_turn.iter().flatten().flatten();
@@ -246,7 +245,7 @@ fn in_sea(sea: &Sea, tiles: usize) -> Vec<Detection> {
             .any(|t| (t[0] - tip[0]).hypot(t[1] - tip[1]) < NEAR_TARGET)
     };
     let near: Vec<bool> = tips.par_iter().map(near_target).collect();
-    // Neighbouring rays share pixels: about a quarter of them are independent.
+    // Neighbouring rays share pixels: about a quarter of the rays are independent.
     let trials =
         |of: bool| 0.25 * (near.iter().filter(|&&n| n == of).count() * ANGLES * tiles) as f64;
     let (trials_near, trials_far) = (trials(true), trials(false));
@@ -279,7 +278,7 @@ fn in_sea(sea: &Sea, tiles: usize) -> Vec<Detection> {
                         snr: f32::INFINITY,
                         contrast_db: None,
                     };
-                    // A line that ends at a target, or somewhat before it, begins there.
+                    // A line that ends at a target, or shortly before it, begins there.
                     let onward = [0.0, NEAR_TARGET, 2.0 * NEAR_TARGET];
                     let at_end = |on: f32| near_target(&wake.at(wake.length + on));
                     let backward = !near && onward.into_iter().any(at_end);
@@ -292,7 +291,7 @@ fn in_sea(sea: &Sea, tiles: usize) -> Vec<Detection> {
     found.collect()
 }
 
-/// log₁₀ of the chance that a normal number is further than t from 0.
+/// log₁₀ of the probability that a normal number is further than t from 0; 0 for t below 1.
 ///
 /// ```text
 /// P = 2 φ(t) / (t + 1/(t + 2/(t + 3/(t + …))))
@@ -332,7 +331,7 @@ mod tests {
         }
     }
 
-    /// A dark line of a standard deviation is found where it lies, and the sea around it stays below the threshold.
+    /// A dark line one standard deviation deep is found where it lies, and the sea around it stays below the threshold.
     #[test]
     fn a_dark_line_beside_a_target_is_found() {
         let (size, mut alarms) = (400, 0);
@@ -353,7 +352,7 @@ mod tests {
             dark(&mut levels);
             let found = find(&GreyImage::from_levels(size, size, &levels));
             let first = found.first().expect("the line").wake;
-            // A line can be followed both ways; where it lies is what a sum along it tells.
+            // A sum along a line gives its position, but not its direction.
             let [right, down] = first.direction();
             let off = (first.axis_deg - 90.0 + 90.0).rem_euclid(180.0) - 90.0;
             let middle = first.tip[1] + (210.0 - first.tip[0]) * down / right;

@@ -1,12 +1,12 @@
-//! Images that are read window by window, however large they are.
+//! Images of any size that are read window by window.
 
 use std::convert::Infallible;
 
 use crate::image::GreyImage;
 
-/// An image of which windows can be read, by several threads at once.
+/// An image whose windows can be read by several threads at once.
 pub trait Raster: Sync {
-    /// Why a window cannot be read.
+    /// Error of reading a window.
     type Error: Send;
 
     /// Number of rows.
@@ -15,12 +15,12 @@ pub trait Raster: Sync {
     /// Number of columns.
     fn columns(&self) -> usize;
 
-    /// A rectangle inside the image as numbers, row by row: amplitude, or grey of any scaling. What is no number is missing:
-    /// land, or pixels without data.
+    /// Reads a rectangle inside the image, row by row: amplitude, or grey levels of any scaling. Pixels that are not finite
+    /// count as missing: land, or pixels without data.
     ///
     /// # Errors
     ///
-    /// Those of the file behind it.
+    /// The errors of the underlying file.
     fn window(
         &self,
         top: usize,

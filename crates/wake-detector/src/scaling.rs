@@ -1,8 +1,8 @@
-//! Grey images at other scales.
+//! Resampling of grey images.
 
-/// An image at another scale: every pixel is a mean under a triangle as wide as the coarser pixels of both.
+/// Resamples an image with a triangular filter as wide as the coarser of the old and new pixels.
 ///
-/// The middle of the first pixel goes to ½ · factor − ½; result: rows, columns and pixels.
+/// The centre of the first pixel moves to ½ · factor − ½. Returns rows, columns and pixels.
 pub(crate) fn rescaled(
     pixels: &[f32],
     rows: usize,
@@ -41,7 +41,7 @@ pub(crate) fn rescaled(
     (new_rows, new_columns, scaled)
 }
 
-/// For every new pixel the first old one under its triangle, and the weights, with sum 1.
+/// For every new pixel, the first old pixel under its triangle, and the weights, which sum to 1.
 fn weights(old: usize, new: usize, factor: f32) -> Vec<(usize, Vec<f32>)> {
     let reach = (1.0 / factor).max(1.0);
     let one = |i: usize| {
@@ -64,7 +64,7 @@ fn weights(old: usize, new: usize, factor: f32) -> Vec<(usize, Vec<f32>)> {
 mod tests {
     use super::*;
 
-    /// A constant stays, and a ramp keeps its slope: pixel i of the new image lies at (i + ½)/factor − ½ of the old.
+    /// Constants and the slopes of ramps are kept: pixel i of the new image lies at (i + ½)/factor − ½ of the old.
     #[test]
     fn scaling_keeps_constants_and_ramps() {
         let (rows, columns) = (40, 60);
@@ -77,7 +77,7 @@ mod tests {
             for row in r / 4..3 * r / 4 {
                 for column in c / 4..3 * c / 4 {
                     let expected = at(column) + 2.0 * at(row);
-                    // A triangle sampled at whole pixels has its centre of mass off by less than a tenth of one.
+                    // Sampled at whole pixels, the centre of mass of a triangle is off by less than a tenth of a pixel.
                     let error = (scaled[row * c + column] - expected).abs();
                     assert!(error < 0.3, "{factor} {row} {column}: {error}");
                 }

@@ -1,49 +1,49 @@
-//! The rules by which detections are right, and what follows: recall, precision, average precision.
+//! Rules that match detections with labels, and the resulting recall, precision and average precision.
 //!
-//! *Ray rule*: the axes differ by at most 10°, and the tips lie within 60 pixels of each other, or the found axis passes
-//! within 25 pixels of the labelled tip and of the middle of the labelled ray. *Box rule*: the boxes, cut to the image,
-//! share at least half of what they cover together. Detections are taken the surest first, one for a label; a second one
-//! on a label is a false alarm. One that fits an ignored label best is neither right nor wrong.
+//! *Ray rule*: the axes differ by at most 10°, and the tips lie within 60 pixels of each other, or the detected axis passes
+//! within 25 pixels of the labelled tip and of the middle of the labelled ray. *Box rule*: the boxes, cut to the image, have
+//! an intersection over union of at least 0.5. Detections are matched in descending order of score, one per label; a second
+//! detection of a label is a false alarm. A detection that fits an ignored label best is neither right nor wrong.
 
 use crate::wake::{Detection, Wake};
 
-/// Bounds of the rules: degrees, pixels, pixels, share.
+/// Bounds of the rules: angle \[deg\], distance of tips and of lines \[pixels\], intersection over union.
 const TURN: f64 = 10.0;
 const TIP: f64 = 60.0;
 const LINE: f64 = 25.0;
 const SHARE: f64 = 0.5;
 
-/// A place in an image: (column, row), whole numbers at the centres of pixels.
+/// A position in an image: (column, row), with whole numbers at the centres of pixels.
 pub type Point = [f64; 2];
 
-/// A ray and a box as the rules see them.
+/// A ray and a box, as the rules use them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ray {
     /// Where the wake begins.
     pub tip: Point,
-    /// From the tip along the wake [deg clockwise from the image's up].
+    /// Direction from the tip along the wake [deg clockwise from the image's up].
     pub axis_deg: f64,
-    /// Corners in order around it; the box rule passes over a ray without one.
+    /// Corners in order around the box; a ray without one never matches by the box rule.
     pub oriented_box: Option<[Point; 4]>,
 }
 
-/// A wake that is known.
+/// A known wake.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Label {
     /// Where it is.
     pub ray: Ray,
-    /// How far it can be seen \[pixels\].
+    /// Visible length \[pixels\].
     pub length: f64,
-    /// Whether it counts; one that does not is ignored.
+    /// Whether it counts; other labels are ignored.
     pub counts: bool,
     /// Whether either end may be its tip.
     pub ambiguous: bool,
 }
 
-/// Something that was found.
+/// A detection, as the rules use it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
-    /// The surer, the higher.
+    /// Score; higher is more certain.
     pub score: f64,
     /// Where it is.
     pub ray: Ray,
@@ -69,21 +69,21 @@ impl From<&Detection> for Found {
     }
 }
 
-/// An image with what is known and what was found.
+/// Labels and detections of one image.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Judged {
     /// Number of columns.
     pub columns: f64,
     /// Number of rows.
     pub rows: f64,
-    /// What is known.
+    /// Known wakes.
     pub labels: Vec<Label>,
-    /// What was found.
+    /// Detections.
     pub found: Vec<Found>,
 }
 
 impl Judged {
-    /// The same image with what a finder has found in it.
+    /// The same image with new detections.
     #[must_use]
     pub fn with_found(&self, found: &[Detection]) -> Self {
         Self {
@@ -93,29 +93,29 @@ impl Judged {
     }
 }
 
-/// By which rule detections are right.
+/// Rule by which a detection matches a label.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Rule {
     /// Axes and tips.
     Ray,
-    /// What boxes share.
+    /// Intersection over union of boxes.
     Box,
 }
 
-/// Verdict on one detection.
+/// Outcome for one detection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Verdict {
-    /// Number of the image.
+    /// Index of the image.
     pub image: usize,
-    /// Number of the detection in it.
+    /// Index of the detection in it.
     pub detection: usize,
     /// Score of the detection.
     pub score: f64,
-    /// The label it found, if it is right.
+    /// Index of the matched label; `None` for a false alarm.
     pub label: Option<usize>,
 }
 
-/// The verdicts on all detections that are right or wrong, the surest first.
+/// Returns the verdicts on all detections that are right or wrong, in descending order of score.
 #[must_use]
 pub fn verdicts(images: &[Judged], rule: Rule) -> Vec<Verdict> {
     let mut verdicts = Vec::new();
@@ -131,7 +131,7 @@ pub fn verdicts(images: &[Judged], rule: Rule) -> Vec<Verdict> {
                 if label.counts {
                     fits.extend(cost(rule, judged, &found.ray, label).map(|cost| (cost, i)));
                 } else {
-                    // The other rule counts too, as a worse fit.
+                    // A match by the other rule alone counts as a worse fit.
                     let other = match rule {
                         Rule::Ray => Rule::Box,
                         Rule::Box => Rule::Ray,
@@ -163,19 +163,19 @@ pub fn verdicts(images: &[Judged], rule: Rule) -> Vec<Verdict> {
     verdicts
 }
 
-/// Precision and recall of all detections down to each score.
+/// Precision and recall at each score threshold.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
-    /// Labels that count.
+    /// Number of labels that count.
     pub labels: usize,
-    /// Images judged.
+    /// Number of images.
     pub images: usize,
-    /// Score, right ones and false alarms down to it; falling scores.
+    /// Score, and right detections and false alarms at or above it, in descending order of score.
     steps: Vec<(f64, usize, usize)>,
 }
 
 impl Curve {
-    /// The curve of some images.
+    /// Computes the curve of a set of images.
     #[must_use]
     pub fn new(images: &[Judged], rule: Rule) -> Self {
         let mut steps: Vec<(f64, usize, usize)> = Vec::new();
@@ -202,7 +202,7 @@ impl Curve {
         }
     }
 
-    /// Area under the largest precision at each recall or more; `None` without labels.
+    /// Average precision: area under the largest precision at each recall or above; `None` without labels.
     ///
     /// # References
     ///
@@ -221,7 +221,7 @@ impl Curve {
         (self.labels > 0).then_some(area)
     }
 
-    /// The largest recall with no more false alarms an image, and the score it takes.
+    /// Largest recall with at most this many false alarms per image, and its score threshold; `None` without labels.
     #[must_use]
     pub fn recall_at(&self, false_alarms: f64) -> Option<(f64, f64)> {
         let allowed = |&&(_, _, wrong): &&(f64, usize, usize)| {
@@ -235,21 +235,21 @@ impl Curve {
         })
     }
 
-    /// Right detections and false alarms in all.
+    /// Total numbers of right detections and false alarms.
     #[must_use]
     pub fn totals(&self) -> (usize, usize) {
         self.steps.last().map_or((0, 0), |step| (step.1, step.2))
     }
 }
 
-/// How many wakes are found by what each of them is like, at the score that allows so many false alarms an image.
+/// Counts detected wakes by a property of each label, at the score threshold for a number of false alarms per image.
 ///
-/// - `value`: of a label that counts, by the numbers of its image and of the label in it
-/// - `bounds`: rising; bin k holds the values from bound k to below bound k + 1
+/// - `value`: property of a label that counts, by the index of its image and its index in the image
+/// - `bounds`: ascending; bin k holds the values from bound k to below bound k + 1
 ///
 /// # Shapes
 ///
-/// A pair for each bin: wakes found, and all that count.
+/// For each bin, the number of wakes found and the number of wakes that count.
 #[must_use]
 pub fn found_by(
     images: &[Judged],
@@ -283,7 +283,7 @@ pub fn found_by(
     counts
 }
 
-/// How badly a detection fits a label; `None` where it does not.
+/// Misfit of a detection to a label; `None` if they do not match.
 fn cost(rule: Rule, image: &Judged, ray: &Ray, label: &Label) -> Option<f64> {
     match rule {
         Rule::Ray => ray_cost(ray, label),
@@ -312,7 +312,7 @@ fn ray_cost(ray: &Ray, label: &Label) -> Option<f64> {
         .min_by(f64::total_cmp)
 }
 
-/// The cost of a ray that fits another, smaller where it is nearer.
+/// Misfit of a ray to another; `None` if they do not match.
 fn fit(ray: &Ray, tip: Point, axis_deg: f64, length: f64) -> Option<f64> {
     let turn = ((ray.axis_deg - axis_deg + 180.0).rem_euclid(360.0) - 180.0).abs();
     if turn > TURN {
@@ -334,7 +334,7 @@ fn unit(degrees: f64) -> Point {
     [sin, -cos]
 }
 
-/// Area that two convex polygons share over the area they cover together, both cut to an image.
+/// Intersection over union of two boxes, both cut to an image.
 fn shared(a: &[Point; 4], b: &[Point; 4], [columns, rows]: Point) -> f64 {
     let frame = [[0.0, 0.0], [columns, 0.0], [columns, rows], [0.0, rows]];
     let (a, b) = (clipped(a, &frame), clipped(b, &frame));
@@ -352,7 +352,7 @@ fn area(polygon: &[Point]) -> f64 {
     corners.map(|(p, q)| p[0] * q[1] - p[1] * q[0]).sum::<f64>() / 2.0
 }
 
-/// A convex polygon cut by another.
+/// Clips a convex polygon by another.
 ///
 /// # References
 ///
@@ -398,7 +398,7 @@ mod tests {
             [5.0 - r, 5.0],
         ];
         let far = half.map(|[x, y]| [x + 30.0, y]);
-        // A square and itself turned by 45° share an octagon of 2√2 − 2 of its area, where the image cuts nothing off.
+        // A square and the same square turned by 45° share an octagon of 2√2 − 2 of its area, if the image cuts nothing off.
         let inner = |p: [Point; 4]| p.map(|[x, y]| [x + 5.0, y + 5.0]);
         let octagon = 2.0 * 2f64.sqrt() - 2.0;
         assert!((shared(&square, &square, frame) - 1.0).abs() < 1e-12);
@@ -421,7 +421,7 @@ mod tests {
         }
     }
 
-    /// Numbers of the scorer in Python on random labels and detections, ties and ignored ones among them.
+    /// Compares with a scorer in Python on random labels and detections, including ties and ignored labels.
     #[test]
     fn scores_are_those_of_the_scorer_in_python() {
         let text = include_str!("../../../tests/fixtures/own/detector_scores.json");
@@ -497,7 +497,7 @@ mod tests {
         assert!((curve.average_precision().expect("labels") - area).abs() < 1e-12);
     }
 
-    /// Three wakes of values 1, 2 and 5, of which those of 1 and 5 are found; the false alarm between them is one too many.
+    /// Of three wakes with values 1, 2 and 5, the ones with 1 and 5 score above a false alarm, and the one with 2 below it.
     #[test]
     fn wakes_are_counted_by_what_they_are_like() {
         let ray = |x: f64| Ray {

@@ -1,4 +1,4 @@
-//! The search of an image: tiles, scales, network, wakes.
+//! Search of an image: tiles, scales, network, wakes.
 
 use crate::extent::Surroundings;
 use crate::maps::{Maps, same, without_repeats};
@@ -9,9 +9,9 @@ use crate::raster::Raster;
 use crate::scaling::rescaled;
 use crate::wake::{Detection, Wake};
 
-/// Something that gives maps of normalised images.
+/// Computes maps of normalised images.
 pub(crate) trait Mapper: Sync {
-    /// The maps of an image that is normalised; rows and columns are multiples of [`MULTIPLE`].
+    /// Computes the maps of a normalised image; rows and columns are multiples of [`MULTIPLE`].
     ///
     /// # Shapes
     ///
@@ -19,36 +19,40 @@ pub(crate) trait Mapper: Sync {
     fn maps(&self, inputs: Vec<f32>, rows: usize, columns: usize) -> Maps;
 }
 
-/// Pixels of the image between which tips are taken from one tile, and what a tile sees beyond them.
+/// Sides of small and large tiles, and width of the surroundings searched with a tile \[pixels\].
 const TILE: usize = 1024;
 const LARGE_TILE: usize = 2048;
 const MARGIN: usize = 384;
-/// Scales at which an image is searched, when its own fits the network.
+/// Scales at which an image is searched, relative to its native scale.
 const SCALES: [f32; 5] = [0.35, 0.5, 0.7, 1.0, 1.4];
-/// Where the pixel spacing is known: the scales in their order. Everything is searched at the first; each of the others looks where
-/// those before it agree on a score from [`CANDIDATE`] on.
+/// Scales for known pixel spacing, in order. The whole image is searched at the first; each further scale is searched around
+/// wakes whose combined score at the earlier scales is at least [`CANDIDATE`].
 const KNOWN_SCALES: [f32; 3] = [0.7, 1.0, 1.4];
 const CANDIDATE: f32 = 0.02;
-/// How far around a wake and how far along it other scales look, and the longest side of what they look at together
-/// \[pixels at scale 1\].
+/// Margin around a wake and length along it that are searched at further scales, and the longest side of a joint window
+/// \[pixels at the native scale\].
 const AROUND: f32 = 128.0;
 const ALONG: f32 = 400.0;
 const TOGETHER: f32 = 1024.0;
-/// Tips closer than this are one, at scale 1 \[pixels\].
+/// Tips closer than this are the same \[pixels of the image\].
 const NEAR: f32 = 40.0;
-/// No more pixels a side are given to the network at once.
+/// Longest side of a network input without known spacing \[pixels\].
 const LARGEST: f32 = 2560.0;
 
-/// How an image is searched.
+/// Options of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Search {
-    /// Pixel spacing \[m\], where it is known.
+    /// Pixel spacing \[m\], if known.
     pub(crate) spacing: Option<f32>,
-    /// Scores below this are not told.
+    /// Detections with lower scores are not reported.
     pub(crate) least_score: f32,
 }
 
-/// The wakes of an image, the surest first; tips in pixels (column, row) from the centre of the first one.
+/// Wakes with lower scores at a scale do not count, unless lower scores are to be reported. It does not rise with the least score,
+/// on which the scores of the other wakes would then depend.
+const LEAST_AT_A_SCALE: f32 = 0.03;
+
+/// The wakes of an image in descending order of score; tips in pixels (column, row) from the centre of the first pixel.
 pub(crate) fn find<R: Raster>(
     image: &R,
     mapper: &dyn Mapper,
@@ -61,18 +65,18 @@ pub(crate) fn find<R: Raster>(
     Ok(merged(found))
 }
 
-/// What the tiles of an image hold, each wake once, the surest first.
+/// The wakes of all tiles without duplicates, in descending order of score.
 pub(crate) fn merged(found: Vec<Detection>) -> Vec<Detection> {
     without_repeats(found, NEAR)
 }
 
-/// The wakes of all scales, each told once, its score raised where other scales see it, too.
+/// Combines the wakes of all scales without duplicates, with higher scores for wakes found at several scales.
 ///
 /// ```text
 /// score = (max_i s_i + mean_i s_i)/2
 /// ```
 ///
-/// with `s_i` the score at scale i, 0 where nothing is found there.
+/// with `s_i` the score at scale i, 0 if the wake is not found there.
 fn agreed(by_scale: &[Vec<Detection>]) -> Vec<Detection> {
     let count = by_scale.len().max(1) as f32;
     let kept = without_repeats(by_scale.iter().flatten().copied().collect(), NEAR);
@@ -96,25 +100,25 @@ fn agreed(by_scale: &[Vec<Detection>]) -> Vec<Detection> {
     kept.into_iter().map(raised).collect()
 }
 
-/// A part of an image whose tips are told together, and its surroundings, that are seen with it.
+/// A part of an image that is searched at once with its surroundings; wakes with tips in the part belong to the tile.
 #[derive(Debug, Clone, Copy)]
 pub struct Tile {
-    /// First row and column of the part, and the ones behind its last.
+    /// First row and column of the part, and the row and column after its last.
     part: [[usize; 2]; 2],
-    /// The same of what is seen.
+    /// The same for the part with its surroundings.
     seen: [[usize; 2]; 2],
     /// Rows and columns of the image.
     sides: [usize; 2],
 }
 
 impl Tile {
-    /// The tiles of an image; a small one is one tile.
+    /// Splits an image into tiles; a small image is one tile.
     #[must_use]
     pub fn all(rows: usize, columns: usize) -> Vec<Self> {
         Self::of(rows, columns, TILE)
     }
 
-    /// Larger tiles, of which less is seen twice: for images of known pixel spacing, most of which is searched at a coarse scale.
+    /// Splits an image into larger tiles, which overlap less: for known pixel spacing, where most is searched at a coarse scale.
     #[must_use]
     pub fn large(rows: usize, columns: usize) -> Vec<Self> {
         Self::of(rows, columns, LARGE_TILE)
@@ -140,7 +144,7 @@ impl Tile {
         places.map(tile).collect()
     }
 
-    /// Rows, columns and pixels of what is seen.
+    /// Rows, columns and pixels of the part with its surroundings.
     pub(crate) fn pixels<R: Raster>(
         &self,
         image: &R,
@@ -151,7 +155,7 @@ impl Tile {
         Ok((rows, columns, pixels))
     }
 
-    /// A wake found in what is seen, as it lies in the image; `None` where its tip lies in another tile.
+    /// Converts a wake to pixels of the image; `None` if its tip lies in another tile.
     pub(crate) fn placed(&self, mut wake: Wake) -> Option<Wake> {
         wake.tip = [0, 1].map(|a| wake.tip[a] + self.seen[0][1 - a] as f32);
         let inside = |a: usize| {
@@ -168,14 +172,14 @@ impl Tile {
     }
 }
 
-/// A wake found in scaled pixels, in those of the window.
+/// Converts a wake from scaled pixels to pixels of the window.
 pub(crate) fn unscaled(mut wake: Wake, factor: f32) -> Wake {
     wake.tip = wake.tip.map(|x| (x + 0.5) / factor - 0.5);
     wake.length /= factor;
     wake
 }
 
-/// First pixels of the tiles and their sizes: few enough pixels are one tile.
+/// First pixels and sizes of the tiles along one axis; a short axis is one tile.
 fn tiles(size: usize, tile: usize) -> Vec<(usize, usize)> {
     if size <= tile + 2 * MARGIN {
         return vec![(0, size)];
@@ -207,19 +211,22 @@ pub(crate) fn in_tile<R: Raster>(
         Some(metres) => view.around_candidates(native_of_spacing(metres), mapper),
         None => view.at_all_scales(mapper),
     };
-    let told = |one: Detection| -> Option<Detection> {
-        let is_told = one.score >= search.least_score && missing.leaves(&one.wake);
-        let wake = is_told.then(|| tile.placed(one.wake)).flatten()?;
+    let least = search.least_score.min(LEAST_AT_A_SCALE);
+    let placed = |one: Detection| -> Option<Detection> {
+        let counts = one.score >= least && missing.leaves(&one.wake);
+        let wake = counts.then(|| tile.placed(one.wake)).flatten()?;
         Some(Detection { wake, ..one })
     };
     let by_scale: Vec<Vec<Detection>> = by_scale
         .into_iter()
-        .map(|found| found.into_iter().filter_map(told).collect())
+        .map(|found| found.into_iter().filter_map(placed).collect())
         .collect();
-    Ok(view.followed(agreed(&by_scale), tile, search))
+    let mut found = agreed(&by_scale);
+    found.retain(|one| one.score >= search.least_score);
+    Ok(view.followed(found, tile, search))
 }
 
-/// Pixels that are searched.
+/// Pixels to search.
 #[derive(Debug, Clone, Copy)]
 struct View<'a> {
     pixels: &'a [f32],
@@ -228,7 +235,7 @@ struct View<'a> {
 }
 
 impl View<'_> {
-    /// The wakes at each of the scales that are searched where nothing is known of the pixels.
+    /// The wakes at each scale, for unknown pixel spacing.
     fn at_all_scales(&self, mapper: &dyn Mapper) -> Vec<Vec<Detection>> {
         let native = native_scale(self.pixels, self.rows, self.columns);
         let longest = self.rows.max(self.columns) as f32;
@@ -239,7 +246,7 @@ impl View<'_> {
             .collect()
     }
 
-    /// The wakes at the first of the known scales, and at each of the others around what those before it see.
+    /// The wakes at each scale for known pixel spacing; after the first, only around the wakes of the scales before.
     fn around_candidates(&self, native: f32, mapper: &dyn Mapper) -> Vec<Vec<Detection>> {
         let mut by_scale = Vec::new();
         for scale in KNOWN_SCALES {
@@ -259,7 +266,7 @@ impl View<'_> {
         by_scale
     }
 
-    /// Wakes of a tile with the ends of their lines measured in the image.
+    /// Measures the lengths of a tile's wakes in the image.
     fn followed(&self, mut found: Vec<Detection>, tile: &Tile, search: Search) -> Vec<Detection> {
         if found.is_empty() {
             return found;
@@ -283,7 +290,7 @@ impl View<'_> {
         found
     }
 
-    /// The wakes of a part, in pixels of the whole.
+    /// The wakes of a window, in pixels of the whole view.
     fn in_window(
         &self,
         [from, to]: [[usize; 2]; 2],
@@ -324,13 +331,13 @@ impl View<'_> {
     }
 }
 
-/// The windows around some wakes; those that overlap become one, unless it grows too large.
+/// Windows around wakes; overlapping windows are merged unless the result is too large.
 ///
-/// - `native`: the scale of the image
+/// - `native`: native scale of the image
 ///
 /// # Shapes
 ///
-/// First row and column of each, and the ones behind its last.
+/// For each window, its first row and column, and the row and column after its last.
 fn windows(found: &[Detection], size: [usize; 2], native: f32) -> Vec<[[usize; 2]; 2]> {
     let around = (AROUND / native) as usize;
     let window = |one: &Detection| {
@@ -352,7 +359,7 @@ fn windows(found: &[Detection], size: [usize; 2], native: f32) -> Vec<[[usize; 2
     };
     let mut all: Vec<[[usize; 2]; 2]> = Vec::new();
     for mut one in found.iter().map(window) {
-        // What a union covers may touch further windows.
+        // A union may overlap further windows.
         while let Some((at, both)) =
             (0..all.len()).find_map(|at| Some((at, union(&all[at], &one)?)))
         {
@@ -368,13 +375,13 @@ fn overlap(a: &[[usize; 2]; 2], b: &[[usize; 2]; 2]) -> bool {
     (0..2).all(|axis| a[0][axis] < b[1][axis] && b[0][axis] < a[1][axis])
 }
 
-/// The scale at which the speckle is correlated as in most of what the network learned from, ½ to 1.
+/// Scale at which the speckle is correlated as in most training images, ½ to 1.
 ///
 /// ```text
 /// ρ₁ = exp(−1/4s²),    scale = s₀/s
 /// ```
 ///
-/// with ρ₁ the correlation of neighbouring pixels, s the width of the response and s₀ = 0.7 pixels.
+/// with ρ₁ the correlation of neighbouring pixels, s the width of the impulse response and s₀ = 0.7 pixels.
 fn native_scale(pixels: &[f32], rows: usize, columns: usize) -> f32 {
     let contrast = normalize::contrast(pixels, rows, columns);
     let cut: Vec<f32> = contrast.iter().map(|z| z.clamp(-2.5, 2.5)).collect();
@@ -395,7 +402,7 @@ fn native_scale(pixels: &[f32], rows: usize, columns: usize) -> f32 {
     (0.7 / width).clamp(0.5, 1.0) as f32
 }
 
-/// The scale of pixels of a known spacing \[m\]: the images that the network learned from have pixels of about ten metres.
+/// Scale for a known pixel spacing \[m\]: the training images have pixels of about ten metres.
 fn native_of_spacing(metres: f32) -> f32 {
     (metres / 10.0).clamp(0.25, 1.0)
 }
@@ -428,10 +435,13 @@ mod tests {
     use crate::network::{INPUTS, Map, OUTPUTS};
     use wake_nn::noise::NoiseSource;
 
-    /// Tips where a pixel is bright, each with a line toward the right.
-    struct Bright;
+    /// Maps with a tip at every bright pixel and a line from it to the right; the logit of the tip depends on the columns of the
+    /// image.
+    struct SpotFinder(fn(usize) -> f32);
 
-    impl Mapper for Bright {
+    const BRIGHT: SpotFinder = SpotFinder(|_| 8.0);
+
+    impl Mapper for SpotFinder {
         fn maps(&self, inputs: Vec<f32>, rows: usize, columns: usize) -> Maps {
             assert!(rows.is_multiple_of(MULTIPLE) && columns.is_multiple_of(MULTIPLE));
             assert_eq!(inputs.len(), INPUTS * rows * columns);
@@ -448,7 +458,7 @@ mod tests {
                 let mut put = |map: Map, column: usize, value: f32| {
                     values[(map as usize * r + row) * c + column.min(c - 1)] = value;
                 };
-                put(Map::Tip, column, 8.0);
+                put(Map::Tip, column, self.0(columns));
                 put(Map::TipRight, column, 1.0);
                 for k in 1..20 {
                     put(Map::Line, column + k, 8.0);
@@ -482,19 +492,51 @@ mod tests {
             .collect()
     }
 
-    /// Speckle of a Gaussian response of 1.2 pixels is native at 0.7/1.2, white noise at 1.
+    /// The native scale is 0.7/1.2 for speckle with a Gaussian response of 1.2 pixels, and 1 for white noise.
     #[test]
     fn the_native_scale_follows_from_the_correlation() {
         let size = 300;
         for (filter, expected) in [(0.0, 1.0), (1.2, 0.7 / 1.2)] {
             let pixels = filtered_noise(size, filter);
-            // Local medians take out a few hundredths of the correlation.
+            // Subtracting local medians lowers the correlation by a few hundredths.
             let found = native_scale(&pixels, size, size);
             assert!((found - expected).abs() < 0.05, "{found} {expected}");
         }
     }
 
-    /// Spots on noise, also beside the seams of tiles, are found once each, where they are.
+    /// A higher least score drops wakes and leaves the scores of the others: a wake with a score of 0.27 at one scale and nearly 1
+    /// at the others keeps its mean over the scales.
+    #[test]
+    fn the_least_score_holds_for_the_reported_scores() {
+        let size = 400;
+        let mut levels: Vec<f32> = (0..size * size)
+            .map(|i| 100.0 + 20.0 * (((i * 2_654_435_761) % 1009) as f32 / 1009.0))
+            .collect();
+        for (r, c) in (0..12).flat_map(|r| (0..12).map(move |c| (r, c))) {
+            levels[(200 + r) * size + 150 + c] = 255.0;
+        }
+        let image = GreyImage::from_levels(size, size, &levels);
+        let mapper = SpotFinder(|columns| if columns < 300 { -1.0 } else { 8.0 });
+        let scores = |least_score: f32| -> Vec<f32> {
+            let search = Search {
+                least_score,
+                ..SEARCH
+            };
+            let Ok(found) = find(&image, &mapper, search);
+            found.iter().map(|one| one.score).collect()
+        };
+        let all = scores(0.03);
+        let [best, ..] = all[..] else {
+            panic!("nothing found");
+        };
+        assert!(best < 0.9, "{best}");
+        for least in [0.1, 0.3, 0.5, best, best + 0.01] {
+            let kept: Vec<f32> = all.iter().copied().filter(|&s| s >= least).collect();
+            assert_eq!(scores(least), kept);
+        }
+    }
+
+    /// Bright spots on noise, some near the seams of tiles, are each found once, at their position.
     #[test]
     fn tiles_lose_nothing_and_tell_nothing_twice() {
         let (rows, columns) = (2100, 1900);
@@ -519,7 +561,7 @@ mod tests {
         assert!(tiles(columns, TILE).len() > 1 && tiles(rows, TILE).len() > 1);
         let Ok(found) = find(
             &GreyImage::from_levels(rows, columns, &levels),
-            &Bright,
+            &BRIGHT,
             SEARCH,
         );
         assert_eq!(found.len(), spots.len(), "{found:?}");
@@ -540,31 +582,31 @@ mod tests {
         }
     }
 
-    /// Whatever the size, the content and the scaling, nothing is told twice and no number is missing.
+    /// Tiny, narrow and flat images are searched without a panic or missing values; flat ones have no wakes.
     #[test]
     fn hard_images_are_searched() {
         let noise = |i: usize| ((i * 2_654_435_761) % 1009) as f32 / 4.0;
         for (rows, columns) in [(1, 1), (17, 4000), (5, 3), (64, 64)] {
             let flat = GreyImage::from_levels(rows, columns, &vec![120.0; rows * columns]);
-            let Ok(found) = find(&flat, &Bright, SEARCH);
+            let Ok(found) = find(&flat, &BRIGHT, SEARCH);
             assert!(found.is_empty());
             let levels: Vec<f32> = (0..rows * columns).map(noise).collect();
             let Ok(_) = find(
                 &GreyImage::from_levels(rows, columns, &levels),
-                &Bright,
+                &BRIGHT,
                 SEARCH,
             );
         }
     }
 
-    /// A bright spot and the line behind it, found at the first scale, are looked at again at the others, where they are; sea is not.
+    /// Further scales search around the bright spot and line found at the first scale; open sea is searched at the first alone.
     #[test]
     fn other_scales_look_where_the_first_found_something() {
         struct Counted(std::sync::Mutex<Vec<[usize; 2]>>);
         impl Mapper for Counted {
             fn maps(&self, inputs: Vec<f32>, rows: usize, columns: usize) -> Maps {
                 self.0.lock().expect("sizes").push([rows, columns]);
-                Bright.maps(inputs, rows, columns)
+                BRIGHT.maps(inputs, rows, columns)
             }
         }
         let (rows, columns) = (900, 1100);
@@ -587,14 +629,14 @@ mod tests {
             (found, mapper.0.into_inner().expect("sizes"))
         };
         let (found, sizes) = searched(&levels);
-        // Told once, and surest; this mapper also takes corners of windows for spots.
+        // Reported once, with the highest score; this mapper also takes corners of windows for spots.
         let at_spot = |one: &Detection| {
             let [x, y] = one.wake.tip;
             (x - 700.0).hypot(y - 400.0) < 14.0
         };
         assert!(at_spot(&found[0]), "{found:?}");
         assert!(!found[1..].iter().any(at_spot), "{found:?}");
-        // The whole image, and windows that are smaller, at least one at each of the other scales.
+        // The whole image, then smaller windows, at least one at each further scale.
         assert!(sizes.len() >= KNOWN_SCALES.len(), "{sizes:?}");
         assert_eq!(
             sizes[0],
@@ -606,7 +648,7 @@ mod tests {
                 "{sizes:?}"
             );
         }
-        // Seen at all scales, with the line to the right.
+        // Found at all scales, with the line to the right.
         assert!(found[0].score > 0.5 && found[0].forward.is_some_and(|f| f > 0.9));
         assert_eq!(searched(&sea).1.len(), 1);
     }

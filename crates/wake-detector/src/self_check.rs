@@ -1,4 +1,4 @@
-//! Can these weights find a wake at all, and does a device compute right numbers? One fixed image tells.
+//! Checks of weights and devices on one fixed image: the maps must be usable, and a device must reproduce the CPU's values.
 
 use std::path::Path;
 use std::sync::Mutex;
@@ -10,22 +10,22 @@ use crate::error::{Error, Result};
 use crate::network::{INPUTS, Network, OUTPUTS};
 use crate::normalize;
 
-/// What flex computes.
+/// Maps computed by flex.
 const REFERENCE: &[u8] = include_bytes!("../assets/self_check.safetensors");
 /// Rows and columns of the image \[pixels\].
 const SIZE: usize = 256;
-/// Products that are summed for a number of a map: 3 × 3 cells of 24 channels.
+/// Products summed for one value of a map: 3 × 3 cells of 24 channels.
 const PRODUCTS: f32 = 9.0 * 24.0;
 
-/// Runs a network on a fixed image with one plain wake, and refuses maps that no training leads to.
+/// Runs a network on a fixed image with one obvious wake, and refuses maps that training cannot produce.
 ///
-/// Every number must be finite. Logits and log-lengths go through the exponential function, so at least half of the numbers of
-/// each map must lie where it neither overflows nor vanishes, |x| ≤ ln(largest f32) = 88.7. Each map must vary by more than rounding,
-/// and no two may be equal. How well the wake is found is not asked: a network that has seen a few images passes.
+/// Every value must be finite. Logits and log-lengths go through the exponential function, so at least half of the values of
+/// each map must lie where it neither overflows nor vanishes, |x| ≤ ln(largest f32) = 88.7. Each map must vary by more than
+/// rounding, and no two may be equal. The check does not ask how well the wake is found: random initial weights pass.
 ///
 /// # Errors
 ///
-/// [`Error::WrongMaps`] with the file, and what is wrong.
+/// [`Error::WrongMaps`] with the file and the fault.
 pub fn self_check(network: &Network, weights: &Path, device: &Device) -> Result<()> {
     let maps = maps(network, device);
     let values: Vec<f32> = maps.into_data().iter::<f32>().collect();
@@ -39,16 +39,16 @@ pub fn self_check(network: &Network, weights: &Path, device: &Device) -> Result<
     }
 }
 
-/// Compares the maps of this crate's network on a device with numbers of the CPU backend flex.
+/// Compares the maps of the shipped network on a device with those of the CPU backend flex.
 ///
 /// # Errors
 ///
-/// [`wake_nn::Error::WrongNumbers`] by how much they differ, and the allowed difference.
+/// [`wake_nn::Error::WrongNumbers`] with the difference and the allowed difference.
 pub fn check_device(device: &Device) -> wake_nn::Result<()> {
     check::compare(device, REFERENCE, [stage(device)?])
 }
 
-/// Checks a device that is no CPU when a detector is made on it, once a process.
+/// Checks a device other than a CPU once per process, when a detector is made on it.
 pub(crate) fn check_once(device: &Device) -> wake_nn::Result<()> {
     static CHECKED: Mutex<Vec<Device>> = Mutex::new(Vec::new());
     check::check_once(&CHECKED, device, check_device)
@@ -61,7 +61,7 @@ fn stage(device: &Device) -> wake_nn::Result<Stage> {
     ))
 }
 
-/// The maps of the image.
+/// Maps of the fixed image.
 fn maps(network: &Network, device: &Device) -> Tensor<4> {
     let contrast = normalize::contrast(&plain_wake(), SIZE, SIZE);
     let seen: Vec<[f32; INPUTS]> = contrast.into_iter().map(normalize::inputs).collect();
@@ -72,7 +72,7 @@ fn maps(network: &Network, device: &Device) -> Tensor<4> {
     network.forward(Tensor::from_data(inputs, device))
 }
 
-/// First fault of the maps `[OUTPUTS, rows, columns]`; `None` for good ones.
+/// First fault of the maps `[OUTPUTS, rows, columns]`; `None` for good maps.
 fn fault(values: &[f32]) -> Option<&'static str> {
     if !values.iter().all(|x| x.is_finite()) {
         return Some("not finite");
@@ -104,7 +104,7 @@ fn fault(values: &[f32]) -> Option<&'static str> {
         .then_some("equal to each other")
 }
 
-/// Grey levels of a dark line from (77, 128) toward the right behind a bright ship, on noise: row by row.
+/// Grey levels, row by row, of a dark line from (77, 128) to the right behind a bright ship, on noise.
 fn plain_wake() -> Vec<f32> {
     let level = |i: usize| {
         let (right, down) = ((i % SIZE) as f32 - 77.0, (i / SIZE) as f32 - 128.0);
@@ -120,7 +120,7 @@ fn plain_wake() -> Vec<f32> {
     (0..SIZE * SIZE).map(level).collect()
 }
 
-/// A number of mean 0 and variance 1 that follows from its place: the sum of twelve uniform ones.
+/// Pseudorandom number of mean 0 and variance 1, fixed for each place: the sum of twelve uniform ones, less 6.
 fn normal(place: u64) -> f32 {
     let mut state = place.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     let mut uniform = || {
@@ -136,7 +136,7 @@ mod tests {
     use super::*;
     use crate::{Detector, GreyImage};
 
-    /// With `DRAW=1` this writes the file anew.
+    /// With `DRAW=1`, rewrites the file.
     #[test]
     fn the_file_has_what_flex_computes() {
         let device = Device::flex();
@@ -145,7 +145,7 @@ mod tests {
         check_device(&device).expect("flex against flex");
     }
 
-    /// Numbers that maps may have: each varies, no two are equal.
+    /// Acceptable maps: each varies, no two are equal.
     fn good() -> Vec<f32> {
         let cell = |i: usize| (i * 7 % 11) as f32 - 5.0;
         (0..OUTPUTS * 16)
@@ -165,7 +165,7 @@ mod tests {
         };
         assert_eq!(changed(5..6, &|_| f32::NAN), Some("not finite"));
         assert_eq!(changed(5..6, &|_| f32::INFINITY), Some("not finite"));
-        // Above ln(f32::MAX) in more than half of a map of 16.
+        // More than half of a map of 16 values above ln(f32::MAX).
         assert_eq!(changed(16..25, &|i| 89.0 + i as f32), Some("saturated"));
         assert_eq!(changed(16..24, &|i| 89.0 + i as f32), None);
         assert_eq!(changed(16..32, &|_| -3.9), Some("constant"));
@@ -175,7 +175,7 @@ mod tests {
         );
     }
 
-    /// The shipped network finds the wake where it is; random first weights pass as they must, whatever their seed.
+    /// The shipped network finds the wake where it is; random initial weights pass for any of eight seeds.
     #[test]
     fn the_wake_is_plain_and_first_weights_pass() {
         let device = Device::flex();
@@ -183,7 +183,7 @@ mod tests {
         let image = GreyImage::eight_bits(SIZE, SIZE, levels).expect("an image");
         let found = Detector::pretrained(&device).expect("weights").find(&image);
         let first = found.first().expect("a wake");
-        // As the ray rule has it.
+        // Bounds of the ray rule.
         assert!((first.wake.axis_deg - 90.0).abs() < 10.0, "{first:?}");
         let [x, y] = first.wake.tip;
         assert!((x - 77.0).hypot(y - 128.0) < 60.0, "{first:?}");

@@ -1,22 +1,22 @@
-//! Wakes in an image.
+//! Wakes and detections in an image.
 
-/// Half the width of a box at least \[pixels\]: that of the line itself.
+/// Smallest half-width of a box \[pixels\], for the line itself.
 const LEAST_HALF_WIDTH: f32 = 8.0;
 
 /// A wake in an image: a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wake {
-    /// Where its line begins, (column, row); whole numbers at the centres of pixels.
+    /// Start of the line, (column, row), with whole numbers at the centres of pixels.
     pub tip: [f32; 2],
-    /// From the tip along the wake [deg clockwise from the image's up].
+    /// Direction from the tip along the wake [deg clockwise from the image's up].
     pub axis_deg: f32,
     /// Half the angle between the outer edges \[deg\].
     pub half_angle_deg: f32,
-    /// How far it can be seen \[pixels\].
+    /// Visible length \[pixels\].
     pub length: f32,
-    /// Signal over noise of a filter that knows the wake, or infinity where a label states none.
+    /// Signal-to-noise ratio of a matched filter, or infinity if unknown.
     pub snr: f32,
-    /// How much it changes the intensity \[dB\], where a label states it.
+    /// Change of intensity \[dB\], if a label states it.
     pub contrast_db: Option<f32>,
 }
 
@@ -27,15 +27,15 @@ impl Wake {
         direction(self.axis_deg)
     }
 
-    /// The place `along` the wake.
+    /// The position at a distance `along` the wake from its tip \[pixels\].
     #[must_use]
     pub fn at(&self, along: f32) -> [f32; 2] {
         let [right, down] = self.direction();
         [self.tip[0] + along * right, self.tip[1] + along * down]
     }
 
-    /// Corners (column, row) of the box from the tip to the end of what is visible, as wide as the outer edges are apart at half
-    /// the length, at least 16 pixels: to the left of the tip, to its right, and the end.
+    /// Corners (column, row) of the box around the visible wake, as wide as the distance of the outer edges at half the length,
+    /// at least 16 pixels: left and right of the tip, then right and left of the end.
     #[must_use]
     pub fn oriented_box(&self) -> [[f32; 2]; 4] {
         let opening = self.half_angle_deg.clamp(0.0, 30.0).to_radians().tan();
@@ -58,33 +58,33 @@ impl Wake {
 /// Visible length of a wake, measured in the image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extent {
-    /// From the tip \[pixels\].
+    /// Length from the tip \[pixels\].
     pub length: f32,
-    /// Its standard deviation \[pixels\].
+    /// Standard deviation of the length \[pixels\].
     pub deviation: f32,
 }
 
-/// A wake that was found, in pixels of the image.
+/// A detected wake, in pixels of the image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Detection {
-    /// Near 0: sea; near 1: a wake. An order, not a probability.
+    /// Near 0 for sea, near 1 for a wake: a ranking, not a probability.
     pub score: f32,
-    /// Tip, axis, half-angle and visible length; its signal-to-noise is unknown, so infinite.
+    /// Tip, axis, half-angle and visible length; the signal-to-noise ratio is unknown, so infinite.
     pub wake: Wake,
-    /// The end of the line as measured in the image; `None` where it was not.
+    /// Length of the line measured in the image; `None` if it could not be measured.
     pub extent: Option<Extent>,
-    /// Agreement of the line's direction with the axis: 1 from tip to end, −1 from end to tip; `None` where the method gives none.
+    /// Agreement of the line's direction with the axis: 1 from tip to end, −1 from end to tip; `None` if the method gives none.
     pub forward: Option<f32>,
     /// Probability of a wake in either direction; `None` without a calibration.
     pub probability: Option<f32>,
-    /// Probability that tip and end are not taken for each other, if it is a wake; `None` without a calibration.
+    /// Probability that tip and end are not confused, if it is a wake; `None` without a calibration.
     pub direction_probability: Option<f32>,
-    /// Whether it counts as found. Pictures, tables and summaries show these detections.
+    /// Whether it counts as found; pictures, tables and summaries show only such detections.
     pub sure: bool,
 }
 
 impl Detection {
-    /// A sure detection of a method without probabilities.
+    /// Makes a sure detection without probabilities.
     #[must_use]
     pub fn new(score: f32, wake: Wake) -> Self {
         Self {
@@ -98,7 +98,7 @@ impl Detection {
         }
     }
 
-    /// The detection with the length that was measured, where one was.
+    /// The detection with its measured length, if it has one.
     #[must_use]
     pub fn measured(mut self) -> Self {
         self.wake.length = self.extent.map_or(self.wake.length, |extent| extent.length);
@@ -106,13 +106,13 @@ impl Detection {
     }
 }
 
-/// The unit vector (right, down) of an angle clockwise from the image's up.
+/// Unit vector (right, down) of an angle \[deg\] clockwise from the image's up.
 pub fn direction(degrees: f32) -> [f32; 2] {
     let (sin, cos) = degrees.to_radians().sin_cos();
     [sin, -cos]
 }
 
-/// The angle of a vector (right, down), clockwise from the image's up, 0 to 360.
+/// Angle of a vector (right, down) \[deg\], clockwise from the image's up, 0 to 360.
 pub fn angle_of([right, down]: [f32; 2]) -> f32 {
     right.atan2(-down).to_degrees().rem_euclid(360.0) % 360.0
 }
@@ -126,7 +126,7 @@ mod tests {
         for degrees in [0.0, 37.0, 90.0, 181.0, 270.0, 359.0] {
             assert!((angle_of(direction(degrees)) - degrees).abs() < 1e-3);
         }
-        // Up is a smaller row, right a larger column.
+        // Up is toward smaller rows, right toward larger columns.
         assert!(direction(0.0)[1] < -0.999 && direction(90.0)[0] > 0.999);
     }
 
@@ -143,7 +143,7 @@ mod tests {
         let corners = wake.oriented_box();
         let expected = [[10.0, 12.0], [10.0, 28.0], [130.0, 28.0], [130.0, 12.0]];
         for (a, b) in corners.iter().zip(expected) {
-            // Half the opening of 4° over 60 pixels is 4.2, below the least half-width of 8.
+            // 4° over 60 pixels give a half-width of 4.2, below the smallest one of 8.
             assert!(
                 (a[0] - b[0]).abs() < 1e-3 && (a[1] - b[1]).abs() < 1e-3,
                 "{corners:?}"

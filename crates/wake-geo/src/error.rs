@@ -1,4 +1,4 @@
-//! The one error type of this crate.
+//! Error type of this crate.
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use whole_files::sentence;
 /// Result of the fallible functions of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// Reason why a product could not be opened, read or written, or a pixel not be placed.
+/// Reason why a product could not be opened, read or written, or a pixel could not be located.
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the message names every field")]
 #[derive(Debug, thiserror::Error)]
@@ -43,14 +43,14 @@ pub enum Error {
         there: String,
     },
 
-    /// A file that a product must have.
+    /// A required file that the product lacks.
     #[error(
         "{} has no file {name:?}; download the product again and unpack it whole",
         shown(path)
     )]
     Missing { path: PathBuf, name: String },
 
-    /// A product without measurement, whose pixels were asked for.
+    /// Pixels of a product that has no measurement.
     #[error(
         "{} has annotation but no measurement, so it has places but no pixels; download the product again and unpack it \
          whole",
@@ -58,11 +58,11 @@ pub enum Error {
     )]
     NoMeasurement { path: PathBuf },
 
-    /// Content of a file that cannot be right.
+    /// Content that cannot be right.
     #[error("{file:?}: {why}; the file is damaged: download the product again")]
     Damaged { file: String, why: String },
 
-    /// More than a limit of this crate allows.
+    /// A value above a limit of this crate.
     #[error("{file:?}: {what} is {value}, above the limit {limit}; {remedy}")]
     TooLarge {
         file: String,
@@ -72,7 +72,7 @@ pub enum Error {
         remedy: &'static str,
     },
 
-    /// A TIFF file that uses what this crate does not read.
+    /// A TIFF file with a feature that this crate does not read.
     #[error("{file:?}: {what} is not supported; convert the file with `{remedy}`")]
     Unsupported {
         file: String,
@@ -86,7 +86,7 @@ pub enum Error {
     )]
     NoPlaces { file: String, why: String },
 
-    /// A number outside the closed range in which it means something.
+    /// A number outside the allowed closed range.
     #[error("{name} is {value}, outside [{min}, {max}]; give a number in this range")]
     OutOfRange {
         name: &'static str,
@@ -95,7 +95,7 @@ pub enum Error {
         max: f64,
     },
 
-    /// A window that is empty or not wholly inside the image.
+    /// A window that is empty or not entirely inside the image.
     #[error(
         "the window of lines {lines:?} and pixels {pixels:?} is empty or leaves the image of {size_lines} lines and \
          {size_pixels} pixels; cut it at the borders"
@@ -120,11 +120,11 @@ pub enum Error {
         smallest: usize,
     },
 
-    /// A product that would be written over.
+    /// A product that already exists and would be overwritten.
     #[error("{} exists; choose another folder, or move it away", shown(path))]
     Exists { path: PathBuf },
 
-    /// A file that could not be written as asked.
+    /// A file that could not be written as requested.
     #[error("cannot write {}: {why}", shown(path))]
     Unwritable { path: PathBuf, why: String },
 }
@@ -150,7 +150,7 @@ impl Error {
     }
 }
 
-/// A path in a sentence, without control characters.
+/// A path for use in a sentence, without control characters.
 fn shown(path: &Path) -> String {
     sentence(&path.to_string_lossy())
 }

@@ -1,4 +1,4 @@
-//! Shortest lines on the WGS84 ellipsoid.
+//! Geodesics on the WGS84 ellipsoid.
 
 use geographiclib_rs::{DirectGeodesic, Geodesic, InverseGeodesic};
 
@@ -11,7 +11,7 @@ pub struct Track {
     pub azimuth: f64,
 }
 
-/// Shortest line from one (latitude, longitude) to another \[degrees\]; C. F. F. Karney, *Algorithms for geodesics* (2013).
+/// Geodesic from one (latitude, longitude) to another \[degrees\]; C. F. F. Karney, *Algorithms for geodesics* (2013).
 pub fn track(from: (f64, f64), to: (f64, f64)) -> Track {
     let (distance, azimuth, _, _) = Geodesic::wgs84().inverse(from.0, from.1, to.0, to.1);
     Track {
@@ -30,7 +30,7 @@ pub fn destination(from: (f64, f64), azimuth: f64, distance: f64) -> (f64, f64) 
 mod tests {
     use super::*;
 
-    /// Karney's example: from JFK to the north-east; and lines along a meridian and the equator.
+    /// Karney's example, from JFK to the north-east; and lines along a meridian and the equator.
     #[test]
     fn tracks_are_those_of_geographiclib() {
         let to = (32.621100463725796, 49.052487092959836);

@@ -11,20 +11,20 @@ use crate::product::Product;
 
 /// Polygons of land.
 ///
-/// The built-in ones are of Natural Earth at 1:10 million: coasts are off by some hundred metres, and the smallest islands are
-/// missing.
+/// The built-in polygons are Natural Earth's at 1:10 million: coasts are off by some hundred metres, and the smallest
+/// islands are missing.
 #[derive(Clone, Debug, Default)]
 pub struct Land {
-    /// Closed lines of (longitude, latitude) \[degrees\]; what lies inside an odd number of them is land.
+    /// Closed lines of (longitude, latitude) \[degrees\]; points inside an odd number of them are land.
     rings: Vec<Vec<[f64; 2]>>,
 }
 
-/// Land around a product, on a lattice of latitude and longitude.
+/// Land around a product, on a grid of latitude and longitude.
 #[derive(Clone, Debug)]
 pub struct LandMask {
     /// Longitude and latitude of the first cell \[degrees\].
     first: [f64; 2],
-    /// Cells along longitude and latitude.
+    /// Number of cells along longitude and latitude.
     size: [usize; 2],
     cells: Vec<bool>,
 }
@@ -37,15 +37,15 @@ const STEP: f64 = 0.005;
 const MOST_POINTS: usize = 5_000_000;
 /// Largest buffer around land \[m\].
 const LARGEST_BUFFER: f64 = 50_000.0;
-/// Metres of a degree of latitude.
+/// Length of a degree of latitude \[m\].
 const DEGREE: f64 = 111_195.0;
 
 impl Land {
-    /// The built-in coast: Natural Earth, public domain.
+    /// Returns the built-in coast: Natural Earth, public domain.
     ///
     /// # Panics
     ///
-    /// Never: the data are part of the program.
+    /// Never: the data are part of the crate.
     pub fn natural_earth() -> Self {
         let packed = include_bytes!("../assets/land.bin");
         let mut bytes = Vec::new();
@@ -87,7 +87,7 @@ impl Land {
     ///
     /// # Errors
     ///
-    /// A file that cannot be read, is no GeoJSON, holds no polygon, or more than five million points.
+    /// A file that cannot be read, is not GeoJSON, or has no polygon or more than five million points.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = whole_files::read_regular(path).map_err(|e| Error::io(path, e))?;
         let file: Value = serde_json::from_slice(&bytes)
@@ -134,7 +134,7 @@ impl Land {
         self.rings.push(points.filter_map(point).collect());
     }
 
-    /// The land around a product, and everything closer to it than `buffer` \[m\].
+    /// Land around a product, including everything closer to it than `buffer` \[m\].
     ///
     /// # Errors
     ///
@@ -151,7 +151,7 @@ impl Land {
                 places.push([place.longitude, place.latitude]);
             }
         }
-        // Across ±180° longitudes go on.
+        // Longitudes are made continuous across ±180°.
         let reference = places[0][0];
         for place in &mut places {
             place[0] = near(place[0], reference);
@@ -183,7 +183,7 @@ impl Land {
         Ok(mask)
     }
 
-    /// Fills the cells inside the rings, row by row by the even-odd rule.
+    /// Fills the cells inside the rings, row by row with the even-odd rule.
     fn fill(&self, mask: &mut LandMask) {
         let mut crossings: Vec<Vec<f64>> = vec![Vec::new(); mask.size[1]];
         let [west, south] = mask.first;
@@ -221,7 +221,7 @@ impl Land {
 }
 
 impl LandMask {
-    /// Whether a place is land, or close to it; what lies beyond the product is no land.
+    /// Whether a place is land or within the buffer of land; `false` beyond the surroundings of the product.
     pub fn is_land(&self, latitude: f64, longitude: f64) -> bool {
         let longitude = near(longitude, self.first[0] + 0.5 * self.size[0] as f64 * CELL);
         let cell = |value: f64, axis: usize| {
@@ -244,7 +244,7 @@ impl LandMask {
         if reach == 0 {
             return;
         }
-        // Cells to the nearest land of the same column.
+        // Number of cells to the nearest land in the same column.
         let mut away = vec![usize::MAX; self.cells.len()];
         for column in 0..columns {
             let mut sweep = |order: &mut dyn Iterator<Item = usize>| {
@@ -281,7 +281,7 @@ impl LandMask {
     }
 }
 
-/// The longitude within half a turn of another.
+/// The longitude nearest to another, up to whole turns.
 fn near(longitude: f64, reference: f64) -> f64 {
     longitude - 360.0 * ((longitude - reference) / 360.0).round()
 }
@@ -302,7 +302,7 @@ mod tests {
         mask
     }
 
-    /// Places far from any coast, whose side anybody knows.
+    /// Places far from any coast.
     #[test]
     fn cities_are_on_land_and_seas_are_not() {
         let land = Land::natural_earth();
@@ -346,7 +346,7 @@ mod tests {
         let mask = mask_of(&land, 3.0, 58.0, 2000.0);
         let north = |metres: f64| mask.is_land(60.0 + metres / DEGREE, 5.0);
         let east = |metres: f64| mask.is_land(60.0, 5.0 + metres / DEGREE / 0.5);
-        // Cells are 280 m high and half as wide there.
+        // Cells there are 280 m high and half as wide.
         assert!(north(2200.0) && !north(2850.0));
         assert!(east(2250.0) && !east(2750.0));
     }

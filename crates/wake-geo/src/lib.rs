@@ -21,7 +21,7 @@ mod geotiff;
 mod picture;
 mod safe;
 
-// What is asked of them.
+// What callers use them for.
 mod product;
 mod land;
 mod locate;

@@ -18,13 +18,13 @@ pub const GRID_POINTS: usize = 200_000;
 pub const IMAGE_SIDE: usize = 1_000_000;
 /// Most pixels of an image that is read by windows.
 pub const IMAGE_PIXELS: u64 = 1 << 36;
-/// Most pixels of one window: 512 MiB of 32-bit values.
+/// Most pixels of one window, 512 MiB of 32-bit values.
 pub const WINDOW_PIXELS: u64 = 128 << 20;
-/// Largest compressed strip or tile of a TIFF file, decoded \[bytes\].
+/// Largest decoded size of a compressed strip or tile of a TIFF file \[bytes\].
 pub const CHUNK_BYTES: usize = 128 << 20;
-/// Decoded strips and tiles that a TIFF reader keeps for the next window \[bytes\].
+/// Largest size of the decoded strips and tiles that a TIFF reader keeps for later windows \[bytes\].
 pub const CACHE_BYTES: usize = 64 << 20;
-/// Most memory of a PNG or JPEG image, which is decoded as a whole \[bytes\].
+/// Most memory for decoding a PNG or JPEG image as a whole \[bytes\].
 pub const PICTURE_BYTES: u64 = 1 << 30;
-/// Most bytes of a measurement in a `.zip` beyond twice its number of pixels.
+/// Largest size of a measurement in a `.zip` beyond two bytes per pixel \[bytes\].
 pub const MEASUREMENT_EXTRA_BYTES: u64 = 64 << 20;

@@ -22,16 +22,16 @@ pub struct Located {
     pub sigma_nought_lut: Option<f64>,
     /// Thermal noise \[DN²\]; `None` for images other than Sentinel-1 products.
     pub noise: Option<f64>,
-    /// σ⁰, linear; `None` without a measurement or given number, and for no data.
+    /// σ⁰, linear; `None` for no data, or if there is neither a measurement nor a given number.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma0: Option<f64>,
 }
 
-/// Describes a pixel of a product. σ⁰ is computed for `digital_number` if it is given, else for the measurement's.
+/// Describes a pixel of a product. σ⁰ uses `digital_number` if given, else the number in the measurement.
 ///
 /// # Errors
-/// A pixel outside the image, an image without places, a measurement that cannot be read, a number below 0 or not
-/// finite.
+/// A pixel outside the image, an image without places, a measurement that cannot be read, a digital number below 0 or
+/// not finite.
 pub fn locate(
     product: &Product,
     line: usize,

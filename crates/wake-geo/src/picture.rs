@@ -1,4 +1,4 @@
-//! PNG and JPEG images, which are decoded as a whole.
+//! PNG and JPEG images, decoded as a whole.
 
 use std::io::{BufReader, Seek};
 use std::ops::Range;
@@ -24,7 +24,7 @@ enum Levels {
 }
 
 impl Picture {
-    /// Decodes a PNG or JPEG file; colours become grey.
+    /// Decodes a PNG or JPEG file; colours are converted to grey.
     pub(crate) fn open(path: &Path, mut file: std::fs::File) -> Result<Self> {
         file.rewind().map_err(|e| Error::io(path, e))?;
         let unreadable = |e: &dyn std::fmt::Display| Error::unreadable(path, e);
@@ -49,7 +49,7 @@ impl Picture {
         })
     }
 
-    /// Levels of a window inside the image; `out` has its size.
+    /// Reads the levels of a window inside the image; `out` has the size of the window.
     pub(crate) fn read(&self, lines: Range<usize>, pixels: Range<usize>, out: &mut [f32]) {
         for (line, out) in lines.zip(out.chunks_exact_mut(pixels.len())) {
             let row = line * self.pixels + pixels.start..line * self.pixels + pixels.end;

@@ -1,6 +1,6 @@
 //! Places of pixels on Earth.
 
-/// Place of a pixel; values that the product does not have are `None`.
+/// Place of a pixel; values that the product lacks are `None`.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Place {
     /// Geodetic latitude on WGS84, north positive \[degrees\].
@@ -15,7 +15,7 @@ pub struct Place {
     pub slant_range_time: Option<f64>,
 }
 
-/// Directions and sizes of the pixels around a place, on the WGS84 ellipsoid.
+/// Directions and spacings of the pixels around a place, on the WGS84 ellipsoid.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct PixelAxes {
     /// Direction of increasing line, clockwise from true north, in [0, 360) \[degrees\].
@@ -28,7 +28,7 @@ pub struct PixelAxes {
     pub pixel_spacing: f64,
 }
 
-/// Longitude in [−180, 180).
+/// Wraps a longitude to [−180, 180) \[degrees\].
 pub(crate) fn wrapped(longitude: f64) -> f64 {
     match (-180.0..180.0).contains(&longitude) {
         true => longitude,

@@ -1,4 +1,4 @@
-//! One type for every raster with places.
+//! One type for every raster image.
 
 use std::io::Read;
 use std::ops::Range;
@@ -15,10 +15,10 @@ use crate::safe::{Polarization, Sentinel1};
 use crate::window::{Window, check_window};
 use whole_files::sentence;
 
-/// Raster of pixels, and where they lie on Earth: a Sentinel-1 GRD product, a GeoTIFF, or an image without places.
+/// Raster image and its location on Earth: a Sentinel-1 GRD product, a GeoTIFF, or an image without places.
 ///
-/// Lines and pixels count from 0, and a whole number is the centre of a pixel. The image reaches from −0.5 to the
-/// number of lines less 0.5.
+/// Lines and pixels count from 0, and whole numbers are pixel centres. The image reaches from −0.5 to the number of
+/// lines (or pixels) minus 0.5.
 #[derive(Debug)]
 pub struct Product {
     path: PathBuf,
@@ -42,20 +42,20 @@ pub enum Values {
 }
 
 impl Product {
-    /// Opens a `.SAFE` folder, the `.zip` of one, a TIFF, a PNG or a JPEG file; the content decides, not the name.
-    /// Of a Sentinel-1 product the first of VV, HH, VH and HV that it has is opened.
+    /// Opens a `.SAFE` folder, a `.zip` of one, or a TIFF, PNG or JPEG file; the content decides, not the name. Of a
+    /// Sentinel-1 product, opens the first polarization that it has of VV, HH, VH and HV.
     ///
     /// # Errors
-    /// Paths that cannot be read, formats and products of other types, files that are damaged, truncated or beyond the
-    /// [limits](crate::limits).
+    /// Paths that cannot be read, unsupported formats and product types, files that are damaged, truncated or beyond
+    /// the [limits](crate::limits).
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         Self::open_any(path.as_ref(), None)
     }
 
-    /// Opens one polarization of a Sentinel-1 product; other images have none, and are refused.
+    /// Opens one polarization of a Sentinel-1 product; other images are refused.
     ///
     /// # Errors
-    /// As [`Product::open`]; a polarization that the product does not have.
+    /// As [`Product::open`]; a polarization that the product lacks.
     pub fn open_polarization(path: impl AsRef<Path>, polarization: Polarization) -> Result<Self> {
         Self::open_any(path.as_ref(), Some(polarization))
     }
@@ -135,7 +135,7 @@ impl Product {
         }
     }
 
-    /// The Sentinel-1 product, if it is one: annotation, calibration, times.
+    /// The Sentinel-1 product with annotation, calibration and times, if it is one.
     pub fn sentinel1(&self) -> Option<&Sentinel1> {
         match &self.kind {
             Kind::Sentinel1(product, _) => Some(product),
@@ -143,7 +143,7 @@ impl Product {
         }
     }
 
-    /// Whether pixels can be read; a Sentinel-1 product may have annotation alone.
+    /// Whether pixels can be read; a Sentinel-1 product may have only annotation.
     pub fn has_pixels(&self) -> bool {
         self.sentinel1().is_none_or(Sentinel1::has_measurement)
     }
@@ -161,19 +161,19 @@ impl Product {
         }
     }
 
-    /// Reads a window: σ⁰ of a Sentinel-1 product, samples of other images. Only the strips or tiles under it are read.
-    /// Threads may read at the same time.
+    /// Reads a window: σ⁰ of a Sentinel-1 product, samples of other images. Only the strips or tiles that it covers
+    /// are read. Several threads may read at once.
     ///
     /// # Errors
-    /// A window that is empty, leaves the image or is above the limit; a product without measurement; damaged pixels.
+    /// A window that is empty, leaves the image or exceeds the limit; a product without measurement; damaged pixels.
     pub fn read_window(&self, lines: Range<usize>, pixels: Range<usize>) -> Result<Window> {
         let mut window = Window::default();
         self.read_window_into(lines, pixels, &mut window)?;
         Ok(window)
     }
 
-    /// As [`Product::read_window`], into a window whose memory is used again; after an error it holds nothing that is
-    /// valid.
+    /// As [`Product::read_window`], into an existing window whose memory is reused; after an error its content is
+    /// undefined.
     ///
     /// # Errors
     /// As [`Product::read_window`].
@@ -204,7 +204,7 @@ impl Product {
         Ok(())
     }
 
-    /// Place of a pixel; of a Sentinel-1 product with height, incidence and slant range time.
+    /// Place of a pixel; for a Sentinel-1 product with height, incidence and slant range time.
     ///
     /// # Errors
     /// A pixel outside the image, an image without places, a pixel beyond its map projection.
@@ -225,8 +225,8 @@ impl Product {
         })
     }
 
-    /// The (line, pixel) of a latitude and longitude \[degrees\]: the inverse of [`Product::place`]. `None` where the
-    /// place lies outside the image, or no place of the image is known.
+    /// The (line, pixel) of a latitude and longitude \[degrees\], the inverse of [`Product::place`]. `None` if the
+    /// place lies outside the image, or the image has no places.
     pub fn pixel_of(&self, latitude: f64, longitude: f64) -> Option<(f64, f64)> {
         if !(-90.0..=90.0).contains(&latitude) || !(-720.0..=720.0).contains(&longitude) {
             return None;
@@ -235,7 +235,7 @@ impl Product {
         let found = self
             .geolocation()
             .pixel_of(latitude, longitude, 0.5 * pixels as f64);
-        // Rounding may carry the place of a pixel on the border out of the image.
+        // Rounding may move a pixel on the border out of the image.
         let inside = |at: f64, size: usize| (-0.5 - 1e-6..=size as f64 - 0.5 + 1e-6).contains(&at);
         let clamped = |at: f64, size: usize| at.clamp(-0.5, size as f64 - 0.5);
         found
@@ -250,7 +250,7 @@ impl Product {
     pub fn axes(&self, line: f64, pixel: f64) -> Result<PixelAxes> {
         self.place(line, pixel)?;
         let (lines, pixels) = self.size();
-        // A step of a pixel, inside the image.
+        // One pixel around the position, cut at the borders of the image.
         let around = |at: f64, size: usize| {
             let last = size as f64 - 0.5;
             ((at - 0.5).max(-0.5), (at + 0.5).min(last))
@@ -268,7 +268,7 @@ impl Product {
         })
     }
 
-    /// Geodesic from one (line, pixel) to another: its length, and its direction from true north at the start.
+    /// Geodesic from one (line, pixel) to another: length, and direction at the start from true north.
     ///
     /// # Errors
     /// As [`Product::place`].
@@ -280,8 +280,8 @@ impl Product {
         ))
     }
 
-    /// R/V at a pixel \[s\]: slant range over platform speed. A target that moves toward the radar at u is imaged R/V · u
-    /// away along azimuth. `None` for images other than Sentinel-1 products.
+    /// R/V at a pixel \[s\]: slant range divided by platform speed. A target that moves toward the radar at u is
+    /// imaged R/V · u away along azimuth. `None` for images other than Sentinel-1 products.
     ///
     /// # Errors
     /// As [`Product::place`].

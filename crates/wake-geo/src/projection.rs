@@ -3,7 +3,7 @@
 use proj4rs::Proj;
 use proj4rs::transform::transform;
 
-/// Coordinate reference system by its EPSG code: degrees on the ellipsoid, or a map projection.
+/// Coordinate reference system with an EPSG code: degrees on the ellipsoid, or a map projection.
 ///
 /// Supported codes: 4326 (WGS84), 4258, 4269 and 4979, taken as WGS84; 3857 (web mercator); 32601–32660 and
 /// 32701–32760 (UTM north and south); 25828–25838 (ETRS89 UTM); 26901–26923 (NAD83 UTM); 32661, 32761 (UPS);
@@ -13,7 +13,7 @@ use proj4rs::transform::transform;
 #[derive(Clone, Debug)]
 pub struct Projection {
     epsg: u32,
-    /// Nothing for degrees.
+    /// `None` for degrees.
     map: Option<Box<(Proj, Proj)>>,
 }
 
@@ -47,8 +47,8 @@ impl Projection {
         self.map.is_none()
     }
 
-    /// (latitude, longitude) \[degrees\] of coordinates x, y \[m, or degrees of longitude and latitude\]; `None` beyond
-    /// the projection.
+    /// Converts coordinates x, y \[m, or degrees of longitude and latitude\] to (latitude, longitude) \[degrees\];
+    /// `None` beyond the projection.
     pub fn to_degrees(&self, x: f64, y: f64) -> Option<(f64, f64)> {
         let (longitude, latitude) = match &self.map {
             None => (x, y),
@@ -62,7 +62,7 @@ impl Projection {
         valid.then(|| (latitude, crate::place::wrapped(longitude)))
     }
 
-    /// Coordinates (x, y) of a latitude and longitude \[degrees\]; `None` beyond the projection.
+    /// Converts a latitude and longitude \[degrees\] to coordinates (x, y); `None` beyond the projection.
     pub fn from_degrees(&self, latitude: f64, longitude: f64) -> Option<(f64, f64)> {
         let (x, y) = match &self.map {
             None => (longitude, latitude),
@@ -80,7 +80,7 @@ pub(crate) fn is_geographic(code: u32) -> bool {
     matches!(code, 4326 | 4979 | 4258 | 4269)
 }
 
-/// Ellipsoid of a map, on which its degrees are taken as those of WGS84.
+/// Ellipsoid of a map; degrees on it are taken as WGS84 degrees.
 fn ellipsoid(code: u32) -> &'static str {
     match code {
         25828..=25838 | 26901..=26923 | 3034 | 3035 | 2154 => "+ellps=GRS80",
@@ -88,7 +88,7 @@ fn ellipsoid(code: u32) -> &'static str {
     }
 }
 
-/// Projection in PROJ's words, from the EPSG registry.
+/// PROJ definition of a projection, from the EPSG registry.
 fn definition(code: u32) -> Option<String> {
     let utm = |zone: u32| format!("+proj=utm +zone={zone}");
     let laea = |lat: i32, lon: i32| format!("+proj=laea +lat_0={lat} +lon_0={lon}");

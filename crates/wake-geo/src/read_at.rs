@@ -1,19 +1,19 @@
-//! Sources of bytes that many threads read at once, each where it likes.
+//! Byte sources that many threads can read at once, at any position.
 
 use std::fmt::Debug;
 use std::fs::File;
 use std::io::{self, ErrorKind, Read, Seek, SeekFrom};
 use std::sync::Arc;
 
-/// Bytes of a file, or of a part of it.
+/// Bytes of a file or of a part of it.
 pub(crate) trait ReadAt: Debug + Send + Sync {
-    /// Reads bytes from a place, as many as there are and `buffer` takes.
+    /// Reads bytes from a position, at most as many as `buffer` holds; returns their number.
     fn read_at(&self, at: u64, buffer: &mut [u8]) -> io::Result<usize>;
 
     /// Number of bytes.
     fn size(&self) -> io::Result<u64>;
 
-    /// Fills `buffer` from a place.
+    /// Fills `buffer` from a position.
     fn read_exact_at(&self, mut at: u64, mut buffer: &mut [u8]) -> io::Result<()> {
         while !buffer.is_empty() {
             match self.read_at(at, buffer) {
@@ -46,7 +46,7 @@ impl ReadAt for File {
     }
 }
 
-/// Part of a file, read as if it were one.
+/// Part of a file, read like a file of its own.
 #[derive(Debug)]
 pub(crate) struct Section {
     pub(crate) file: File,
@@ -66,7 +66,7 @@ impl ReadAt for Section {
     }
 }
 
-/// A source read from front to back, with a place of its own.
+/// Sequential reader of a source, with its own position.
 #[derive(Debug)]
 pub(crate) struct Reader {
     source: Arc<dyn ReadAt>,
@@ -94,7 +94,7 @@ impl Seek for Reader {
             SeekFrom::Current(by) => self.at.checked_add_signed(by),
             SeekFrom::End(by) => self.source.size()?.checked_add_signed(by),
         };
-        // Systems count places in files with sign.
+        // Systems count file positions as signed numbers.
         let at = at.filter(|&at| i64::try_from(at).is_ok());
         self.at = at.ok_or(ErrorKind::InvalidInput)?;
         Ok(self.at)

@@ -1,8 +1,8 @@
-//! Times as products write them.
+//! Times in product annotation.
 
 use std::fmt;
 
-/// Instant in UTC without leap seconds, as product annotation gives it, to the microsecond.
+/// Instant in UTC without leap seconds, as given in product annotation, to the microsecond.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct UtcTime(i64);
 
@@ -38,7 +38,7 @@ impl UtcTime {
         ))
     }
 
-    /// Seconds from `earlier` to this time; negative if this time is the earlier one.
+    /// Seconds from `earlier` to this time; negative if this time is earlier.
     pub fn seconds_since(self, earlier: Self) -> f64 {
         (self.0 - earlier.0) as f64 * 1e-6
     }
@@ -85,7 +85,7 @@ fn days_before(year: i64, month: i64, day: i64) -> i64 {
     era * 146_097 + of_era * 365 + of_era / 4 - of_era / 100 + of_year - 719_468
 }
 
-/// Year, month and day of a number of days from 1 January 1970.
+/// Year, month and day after a number of days since 1 January 1970.
 fn date_of(days: i64) -> (i64, i64, i64) {
     let days = days + 719_468;
     let (era, of_era) = (days.div_euclid(146_097), days.rem_euclid(146_097));

@@ -16,12 +16,12 @@ pub struct Window {
     pub values: Vec<f32>,
     /// Number of values without data.
     pub no_data: usize,
-    /// Number of values of σ⁰ set to 0 because the pixel is darker than its thermal noise.
+    /// Number of σ⁰ values set to 0 because DN² is below the thermal noise.
     pub below_noise: usize,
 }
 
 impl Window {
-    /// Makes room for that many lines and pixels.
+    /// Resets the window to a number of lines and pixels.
     pub(crate) fn start(&mut self, lines: usize, pixels: usize) {
         (self.lines, self.pixels) = (lines, pixels);
         (self.no_data, self.below_noise) = (0, 0);
@@ -37,7 +37,7 @@ impl Window {
     }
 }
 
-/// Checks that a window lies in an image of that many lines and pixels, and within the limit on its size.
+/// Checks that a window lies inside an image of the given lines and pixels, and within the size limit.
 pub(crate) fn check_window(
     lines: &Range<usize>,
     pixels: &Range<usize>,
@@ -65,7 +65,7 @@ pub(crate) fn check_window(
     }
 }
 
-/// Checks that a part lies in an image of that many lines and pixels, and has at least `smallest` of both.
+/// Checks that a part lies inside an image of the given lines and pixels and has at least `smallest` of each.
 pub(crate) fn check_part(
     lines: &Range<usize>,
     pixels: &Range<usize>,

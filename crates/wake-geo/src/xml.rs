@@ -22,7 +22,7 @@ pub(crate) struct Document {
     root: Element,
 }
 
-/// One element of a document, for reading.
+/// Reference to one element of a document.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Node<'a> {
     file: &'a str,
@@ -33,7 +33,8 @@ impl Document {
     /// Parses the text of a file; `file` names the file in errors.
     ///
     /// # Errors
-    /// Text that is no well-formed XML, has a document type (entities could multiply it), or is beyond the limits.
+    /// Text that is not well-formed XML, has a document type (whose entities could expand without bound), or exceeds
+    /// a limit.
     pub(crate) fn parse(file: &str, text: &str) -> Result<Self> {
         check_limit(file, "the size in bytes", text.len() as u64, XML_BYTES)?;
         let damaged = |why: String| Error::damaged(file, sentence(&why));
@@ -84,7 +85,7 @@ impl Document {
                     ));
                 }
                 Event::Eof => break,
-                // References stand in no number or name that is read.
+                // No number or name that is read contains references.
                 Event::GeneralRef(_) => here.text.push(char::REPLACEMENT_CHARACTER),
                 Event::Comment(_) | Event::Decl(_) | Event::PI(_) => {}
             }
@@ -145,7 +146,7 @@ impl<'a> Node<'a> {
         &self.element.name
     }
 
-    /// Children of that name.
+    /// Children with the given name.
     pub(crate) fn children(self, name: &str) -> impl Iterator<Item = Self> {
         let file = self.file;
         let matching = self.element.children.iter().filter(move |e| e.name == name);
@@ -158,7 +159,7 @@ impl<'a> Node<'a> {
             .try_fold(self, |node, name| node.children(name).next())
     }
 
-    /// First element at the path `a/b/c` below this one.
+    /// First element at the path `a/b/c` below this one; an error if there is none.
     pub(crate) fn get(self, path: &str) -> Result<Self> {
         self.find(path)
             .ok_or_else(|| self.error(format!("element {:?} has no {path:?}", self.name())))
@@ -169,13 +170,13 @@ impl<'a> Node<'a> {
         self.element.text.trim()
     }
 
-    /// Finite number of the element at a path.
+    /// Finite number in the element at a path.
     pub(crate) fn number(self, path: &str) -> Result<f64> {
         let node = self.get(path)?;
         node.parsed(node.text())
     }
 
-    /// Finite number within a closed range, of the element at a path.
+    /// Finite number within a closed range, in the element at a path.
     pub(crate) fn number_in(self, path: &str, min: f64, max: f64) -> Result<f64> {
         let value = self.number(path)?;
         match (min..=max).contains(&value) {
@@ -184,7 +185,7 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// Whole number within a closed range, of the element at a path.
+    /// Whole number within a closed range, in the element at a path.
     pub(crate) fn integer_in(self, path: &str, min: i64, max: i64) -> Result<i64> {
         let value = self.get(path)?.text();
         match value.parse::<i64>() {
@@ -195,7 +196,7 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// List of finite numbers, at most [`NUMBERS`], of the element at a path.
+    /// List of finite numbers, at most [`NUMBERS`], in the element at a path.
     pub(crate) fn numbers(self, path: &str) -> Result<Vec<f64>> {
         let node = self.get(path)?;
         let mut values = Vec::new();

@@ -1,23 +1,23 @@
-//! The one error of this crate.
+//! The error type of this crate.
 
 use whole_files::quoted;
 
 /// Result of the functions of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// A model that could not be built, read, written or run.
+/// Failure to build, read, write or run a model.
 ///
-/// Wrong shapes handed to a model are mistakes of the program and panic; files, options and numbers that a user chose are
+/// Passing wrong shapes to a model is a programming error and panics; files, options and numbers that a user chose are
 /// reported here.
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the message names every field")]
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// Weights, options, numbers or a device that a network cannot take.
+    /// Weights, options, numbers or a device that a network does not accept.
     #[error(transparent)]
     Model(#[from] wake_nn::Error),
 
-    /// A vocabulary could not be read, or a prompt not be understood.
+    /// A vocabulary could not be read, or a prompt could not be parsed.
     #[error(transparent)]
     Text(#[from] wake_text::Error),
 
@@ -26,7 +26,7 @@ pub enum Error {
     #[error(transparent)]
     Scene(#[from] wake_physics::Error),
 
-    /// A prompt from which no scene follows.
+    /// A prompt states nothing about a scene.
     #[error(
         "the prompt '{}' states nothing of a scene; say, for example, whether there is a ship, its speed and heading, the \
          wind, or the incidence",

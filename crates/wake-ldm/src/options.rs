@@ -1,8 +1,8 @@
 //! Reading the options of a `config.json` one by one, so that none is overlooked.
 //!
-//! Every option is either taken (it shapes the model), required to have the one value that we
-//! implement, or known to change no number. Whatever is left over at the end and is neither `null`
-//! nor `false` might change the numbers, and is refused by name.
+//! Every option is either taken (it shapes the model), required to have the one value that is
+//! implemented, or known not to change the result. Any other option that is neither `null` nor
+//! `false` might change the result, and is rejected by name.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use serde_json::{Map, Value};
 
 use wake_nn::{Error, Result};
 
-/// The options of one component that nobody has looked at yet.
+/// Options of one component that have not been read yet.
 #[derive(Debug)]
 pub(crate) struct Options {
     component: &'static str,
@@ -18,7 +18,7 @@ pub(crate) struct Options {
 }
 
 impl Options {
-    /// Parses the text of a configuration file; `path` only serves messages.
+    /// Parses the text of a configuration file; `path` is used only in messages.
     pub(crate) fn parse(component: &'static str, text: &str, path: &Path) -> Result<Self> {
         let left = serde_json::from_str(text).map_err(|source| Error::Json {
             path: path.to_owned(),
@@ -32,7 +32,7 @@ impl Options {
         self.left.remove(key).filter(|value| !value.is_null())
     }
 
-    /// Takes a value that `read` understands and that may be absent.
+    /// Takes an optional value that `read` accepts.
     pub(crate) fn read<T>(
         &mut self,
         key: &str,
@@ -45,12 +45,12 @@ impl Options {
         found.transpose()
     }
 
-    /// Takes a whole number, or the default where it is absent.
+    /// Takes a whole number, or the default if it is absent.
     pub(crate) fn usize(&mut self, key: &str, default: usize) -> Result<usize> {
         Ok(self.read(key, "a count", count)?.unwrap_or(default))
     }
 
-    /// Takes a number, or the default where it is absent.
+    /// Takes a number, or the default if it is absent.
     pub(crate) fn f64(&mut self, key: &str, default: f64) -> Result<f64> {
         Ok(self.optional_f64(key)?.unwrap_or(default))
     }
@@ -60,13 +60,13 @@ impl Options {
         self.read(key, "a number", Value::as_f64)
     }
 
-    /// Takes a truth value, or the default where it is absent.
+    /// Takes a boolean, or the default if it is absent.
     pub(crate) fn bool(&mut self, key: &str, default: bool) -> Result<bool> {
         let found = self.read(key, "true or false", Value::as_bool)?;
         Ok(found.unwrap_or(default))
     }
 
-    /// Takes one of some names, or the default where it is absent: what stands beside the name.
+    /// Takes one of some names, or the default if it is absent, and returns the value paired with it.
     pub(crate) fn choice<T: Clone>(
         &mut self,
         key: &str,
@@ -97,12 +97,12 @@ impl Options {
         Ok(found.unwrap_or_else(|| vec![default; length]))
     }
 
-    /// Takes a list of counts that must be there.
+    /// Takes a required list of counts.
     pub(crate) fn required_usizes(&mut self, key: &str) -> Result<Vec<usize>> {
         self.required(key, "a list of counts", |value| list(value, count))
     }
 
-    /// Takes a list of texts that must be there.
+    /// Takes a required list of strings.
     pub(crate) fn required_strings(&mut self, key: &str) -> Result<Vec<String>> {
         self.required(key, "a list of texts", |value| list(value, text))
     }
@@ -117,7 +117,7 @@ impl Options {
         found.ok_or_else(|| self.invalid(key, &Value::Null, expected))
     }
 
-    /// Takes an option that must be absent or have one of the values that we implement.
+    /// Takes an option that must be absent or have one of the implemented values.
     pub(crate) fn only<V: Into<Value> + Clone>(
         &mut self,
         key: &str,
@@ -134,14 +134,14 @@ impl Options {
         Err(self.unsupported(key, &value, &names.join(", ")))
     }
 
-    /// Takes options that change no number.
+    /// Discards options that do not change the result.
     pub(crate) fn ignore(&mut self, keys: &[&str]) {
         for key in keys {
             self.left.remove(*key);
         }
     }
 
-    /// Refuses what is left over, except private notes (a leading underscore), `null` and `false`.
+    /// Rejects remaining options, except private notes (a leading underscore), `null` and `false`.
     pub(crate) fn finish(self) -> Result<()> {
         let harmless = |key: &str, value: &Value| {
             key.starts_with('_') || value.is_null() || value == &Value::Bool(false)
@@ -152,7 +152,7 @@ impl Options {
         }
     }
 
-    /// The error for a value that we do not implement.
+    /// Returns the error for a value that is not implemented.
     pub(crate) fn unsupported(&self, key: &str, value: &Value, supported: &str) -> Error {
         Error::Unsupported {
             option: self.named(key),
@@ -182,12 +182,12 @@ fn text(value: &Value) -> Option<String> {
     value.as_str().map(str::to_owned)
 }
 
-/// A list whose entries `read` understands.
+/// Reads a list whose entries `read` accepts.
 pub(crate) fn list<T>(value: &Value, read: impl Fn(&Value) -> Option<T>) -> Option<Vec<T>> {
     value.as_array()?.iter().map(read).collect()
 }
 
-/// Equality that takes 0 and 0.0 for the same number.
+/// Equality that treats 0 and 0.0 as the same number.
 fn same(a: &Value, b: &Value) -> bool {
     match (a.as_f64(), b.as_f64()) {
         (Some(a), Some(b)) => a.total_cmp(&b).is_eq(),

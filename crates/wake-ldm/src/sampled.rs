@@ -1,4 +1,4 @@
-//! Pairs drawn by the wake model instead of the simulator.
+//! Pairs sampled from the wake model instead of the simulator.
 
 use crate::wake_model::sampler::WakeSampler;
 use crate::wake_model::sea_texture::SeaTexture;
@@ -16,9 +16,10 @@ impl Sea for SeaTexture {
     }
 }
 
-/// The scenes of a recipe, drawn by the wake model; a batch is sampled at once.
+/// Scenes of a recipe with images sampled from the wake model, one batch at a time.
 ///
-/// The model draws what it was trained for alone: the one in the crate all scenes of the recipes `ranges`, `satellites` and `model`.
+/// The model samples only scenes within its training ranges; those of the embedded model cover all scenes of the recipes
+/// `ranges`, `satellites` and `model`.
 #[derive(Debug, Clone)]
 pub struct Sampled {
     sampler: WakeSampler,
@@ -26,12 +27,12 @@ pub struct Sampled {
 }
 
 impl Sampled {
-    /// The images that a model draws of the scenes of a set.
+    /// Makes a source of sampled images for the scenes of a set.
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::InvalidOption`] for scenes that the model was not trained for; the first ones are looked at, one that
-    /// comes later is refused when its turn comes.
+    /// [`wake_nn::Error::InvalidOption`] for scenes outside the model's training ranges. The first scenes are checked here, each
+    /// later one when it is sampled.
     pub fn new(sampler: WakeSampler, scenes: Simulated) -> Result<Self> {
         for index in 0..LOOKED_AT {
             sampler.check_scene(&scenes.scene(index)?)?;
@@ -40,7 +41,7 @@ impl Sampled {
     }
 }
 
-/// Scenes that are looked at before the first image.
+/// Number of scenes checked before the first image.
 const LOOKED_AT: u64 = 16;
 
 impl Source for Sampled {
@@ -87,8 +88,8 @@ mod tests {
         Sampled::new(sampler, Simulated::new(recipe, 3)?)
     }
 
-    /// Alone, in a batch or on another thread a pair is the same but for the rounding of sums in another order: 2,000
-    /// ulps of single precision over values of order 1.
+    /// A pair is the same alone, in a batch or on another thread, except for sums rounded in another order: 2,000 ulps of
+    /// single precision for values of order 1.
     #[test]
     fn pairs_do_not_depend_on_their_company() {
         let source = sampled(&[]).unwrap();
@@ -112,7 +113,7 @@ mod tests {
         assert_eq!(batches(1), batches(2));
     }
 
-    /// A run that goes on after its first step has the images of one that was never stopped, bit for bit.
+    /// A run resumed after its first step has the same images as an uninterrupted one, bit for bit.
     #[test]
     fn batches_of_a_resumed_run_are_the_same() {
         let sampler = WakeSampler::pretrained(&Device::flex()).unwrap();
@@ -142,7 +143,7 @@ mod tests {
         assert!(message.contains("grid.spacing"), "{message}");
     }
 
-    /// All that the recipe of satellites draws: sensors, ships, gusts; every image is near its scene's mean, as it is simulated.
+    /// The satellite recipe covers sensors, ships and gusts; every image has about the mean of the simulated one.
     #[test]
     fn the_recipe_of_satellites_is_drawn() {
         let sampler = WakeSampler::pretrained(&Device::flex()).unwrap();
@@ -158,7 +159,7 @@ mod tests {
                 (&pair.scene, &pair.labels),
                 (&simulated.scene, &simulated.labels)
             );
-            // Amplitude of grey 0.2, the median, of both.
+            // Amplitude of grey 0.2, the median, of both images.
             let [a, b] = [pair, &simulated].map(|p| p.amplitudes.unwrap()[1]);
             assert!(
                 (a / b - 1.0).abs() < 0.1,

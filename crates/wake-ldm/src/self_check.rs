@@ -1,4 +1,4 @@
-//! Comparison of a device with the reference backend, by small models of every kind.
+//! Comparison of a device with the reference backend on small models of every kind.
 
 use std::sync::Mutex;
 
@@ -11,22 +11,22 @@ use crate::stable_diffusion::autoencoder::AutoencoderKlConfig;
 use crate::stable_diffusion::text::ClipTextConfig;
 use crate::unet::{UNetConfig, UNetInput};
 
-/// What flex computes.
+/// Results of the flex backend.
 const REFERENCE: &[u8] = include_bytes!("../assets/self_check.safetensors");
 
-/// Runs small models of every kind of Stable Diffusion on a device, and compares with numbers of the CPU backend flex.
+/// Runs a small Stable Diffusion model of every kind on a device and compares the results with those of the CPU backend flex.
 ///
-/// Takes about a second, on GPUs more, because kernels are compiled. Pipelines run it by themselves when
-/// they are made on a device that is no CPU, once for each device.
+/// Takes about a second, longer on GPUs, because kernels are compiled. Pipelines run it automatically when
+/// they are made on a device that is not a CPU, once per device.
 ///
 /// # Errors
 ///
-/// [`wake_nn::Error::WrongNumbers`] with the model that differs, by how much, and the allowed difference.
+/// [`wake_nn::Error::WrongNumbers`] with the model that differs, the difference and the allowed difference.
 pub fn self_check(device: &Device) -> Result<()> {
     self_check::compare(device, REFERENCE, stages(device))
 }
 
-/// Checks a device that is no CPU when something is made on it, once a process.
+/// Checks a device that is not a CPU when something is made on it, once per process.
 ///
 /// # Errors
 ///
@@ -76,7 +76,7 @@ fn autoencoder(device: &Device) -> Stage {
 mod tests {
     use super::*;
 
-    /// With `DRAW=1` this writes the file anew.
+    /// With `DRAW=1` this rewrites the file.
     #[test]
     fn the_file_has_what_flex_computes() {
         let device = Device::flex();

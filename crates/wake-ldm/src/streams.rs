@@ -1,16 +1,16 @@
-//! Streams of numbers that this crate draws from a seed; see [`wake_nn::noise`].
+//! Streams of random numbers in this crate; see [`wake_nn::noise`].
 
-/// Normal numbers: the noise that the first sample is made of.
+/// Normal numbers: noise of the first sample.
 pub const INITIAL_STREAM: u32 = 0;
-/// Normal numbers: the noise that an encoded image is drawn with.
+/// Normal numbers: noise for sampling the latents of an encoded image.
 pub const POSTERIOR_STREAM: u32 = 1;
-/// Normal numbers: the white share of the noise that a flow starts from.
+/// Normal numbers: the white part of the noise from which a flow starts.
 #[cfg(feature = "wake-model")]
 pub const WHITE_STREAM: u32 = 2;
-/// Normal numbers: the noise that a learnt sea starts from.
+/// Normal numbers: the noise from which a learnt sea starts.
 #[cfg(feature = "wake-model")]
 pub const SEA_TEXTURE_STREAM: u32 = 4;
-/// Normal numbers: the noise of the first step; that of step i is `STEP_STREAM + i`.
+/// Normal numbers: noise of the first step; the stream of step i is `STEP_STREAM + i`.
 pub const STEP_STREAM: u32 = 16;
 
 /// Uniform numbers: styles of learnt seas.

@@ -1,4 +1,4 @@
-//! The echo of the ship that leaves a wake: displaced along azimuth by its radial velocity.
+//! Echo of the ship that makes a wake, displaced in azimuth by the ship's radial velocity.
 
 use serde::Serialize;
 use wake_detector::Wake;
@@ -7,28 +7,28 @@ use wake_geo::{Product, Values, Window};
 /// A ship's echo.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Echo {
-    /// Line of its middle.
+    /// Line of the echo's middle.
     pub line: f64,
-    /// Pixel of its middle.
+    /// Pixel of the echo's middle.
     pub pixel: f64,
-    /// Latitude of the place where it is imaged \[degrees\].
+    /// Latitude of the imaged echo \[degrees\].
     pub latitude: f64,
-    /// Longitude of the place where it is imaged \[degrees\].
+    /// Longitude of the imaged echo \[degrees\].
     pub longitude: f64,
-    /// How far it lies from the wake along azimuth, in the direction of flight \[m\]; `None` where the axis of the wake does not
-    /// tell it to 0.25 m/s.
+    /// Displacement from the wake's axis along azimuth, positive in the direction of flight \[m\]; `None` if the standard
+    /// deviation of the resulting velocity exceeds 0.25 m/s.
     pub displacement: Option<f64>,
-    /// Velocity toward the radar that the displacement means \[m/s\].
+    /// Velocity toward the radar, from the displacement \[m/s\].
     pub radial_velocity: Option<f64>,
-    /// Standard deviation of that velocity, by how well the axis and the echo's middle are known \[m/s\].
+    /// Standard deviation of that velocity, from the uncertainties of the axis and the echo's middle \[m/s\].
     pub radial_velocity_deviation: Option<f64>,
-    /// Where the ship is: the place on the wake's axis at the echo's range, since motion displaces an echo along azimuth alone.
-    /// `None` where the axis runs so close to azimuth that the place is not known to 100 m.
+    /// Position of the ship on the wake's axis, at the echo's range, because motion displaces an echo only along azimuth. `None`
+    /// if the axis is so close to azimuth that the uncertainty exceeds 100 m.
     #[serde(skip)]
     pub(crate) ship: Option<ShipOnAxis>,
 }
 
-/// Where a ship is on the axis of its wake.
+/// Position of a ship on the axis of its wake.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ShipOnAxis {
     /// (Pixel, line) of midship.
@@ -37,32 +37,32 @@ pub(crate) struct ShipOnAxis {
     pub(crate) half_length: f64,
 }
 
-/// Fastest ship that is looked for \[m/s\].
+/// Highest speed of a ship \[m/s\].
 const FASTEST: f64 = 18.0;
-/// Pixels to both sides of the tip in which the echo is looked for.
+/// Largest distance of the echo from the tip in range, to both sides \[pixels\].
 const ASIDE: i64 = 24;
-/// An echo is brighter than the sea by this factor.
+/// Lowest brightness of an echo, relative to the sea.
 const BRIGHT: f32 = 8.0;
-/// Pixels around the middle of an echo that may belong to it: half the length of the longest ships.
+/// Largest distance of an echo's pixels from its middle \[pixels\]: half the length of the longest ships.
 const REACH: usize = 20;
-/// Pixels of an echo are brighter than this share of its brightest one: others are sidelobes.
+/// Lowest brightness of an echo's pixels as a share of its brightest pixel, to exclude sidelobes.
 const LEAST_OF_PEAK: f32 = 0.01;
-/// Steps in which the middle of an echo is found from its brightest pixel.
+/// Iterations from the brightest pixel to the middle of an echo.
 const STEPS: usize = 4;
-/// Standard deviation of the middle of an echo, both ways \[pixels\]: of 20 simulated ships 1.1 along azimuth and 1.5 along range.
+/// Standard deviation of the middle of an echo on both axes \[pixels\]: 1.1 in azimuth and 1.5 in range for 20 simulated ships.
 const MIDDLE: f64 = 1.5;
-/// Standard deviation across the axis of a line that stands out, and of one that does not \[pixels\]: the steps in which lines are
-/// fitted, and the cells of the detector's maps.
+/// Standard deviation of the axis across it, for a line that stands out and for any other \[pixels\]: the step of the line
+/// fit, and the cell size of the detector's maps.
 const ACROSS: [f64; 2] = [1.5, 4.0];
-/// A velocity that is known less well is not told \[m/s\].
+/// Largest standard deviation of a reported velocity \[m/s\].
 pub(crate) const MOST_DEVIATION: f64 = 0.25;
-/// A place of the ship that is known less well is not told \[pixels\].
+/// Largest standard deviation of a ship's position along the axis \[pixels\].
 const MOST_ALONG: f64 = 10.0;
 
-/// How a displacement becomes a velocity.
+/// Conversion of displacements to velocities.
 #[derive(Debug, Clone, Copy)]
 struct Displacements {
-    /// Tip of the wake (pixel, line), and the direction from it to its end (right, down).
+    /// Tip of the wake (pixel, line), and direction from tip to end (right, down).
     tip: [f64; 2],
     direction: [f64; 2],
     /// Distance between lines \[m\], and R/V \[s\].
@@ -70,7 +70,7 @@ struct Displacements {
     ratio: f64,
     /// Sine of the incidence angle.
     slant: f64,
-    /// Standard deviation of the place of the axis, across it \[pixels\].
+    /// Standard deviation of the axis across it \[pixels\].
     across: f64,
 }
 
@@ -90,13 +90,13 @@ impl Displacements {
         self.tip[1] + (pixel - self.tip[0]) * down / right
     }
 
-    /// Standard deviation of the velocity \[m/s\]: of the axis, as it is seen along azimuth, and of the echo's middle.
+    /// Standard deviation of the velocity \[m/s\], from the axis, projected on azimuth, and from the echo's middle.
     fn deviation(&self) -> f64 {
         let lines = (self.across / self.direction[0]).hypot(MIDDLE);
         lines * self.line_spacing / self.ratio
     }
 
-    /// Where on the axis a ship is whose echo lies at a range; `None` where that is not known.
+    /// Position on the axis of a ship with an echo at a range; `None` if too uncertain.
     fn ship(&self, pixel: f64, half_length: f64) -> Option<ShipOnAxis> {
         let along = self.across.hypot(MIDDLE) / self.direction[0].abs();
         (along <= MOST_ALONG).then(|| ShipOnAxis {
@@ -105,7 +105,7 @@ impl Displacements {
         })
     }
 
-    /// Whether a ship that leaves the wake astern can be there: its speed, toward the tip, is none that ships do not have.
+    /// Whether an echo can belong to a ship that leaves this wake astern: its speed toward the tip must be possible.
     ///
     /// ```text
     /// u = v/(sin θ · right),    right = the share of the wake's direction that leads away from the radar
@@ -122,7 +122,7 @@ impl Displacements {
     }
 }
 
-/// The echo that belongs to a wake, if there is one.
+/// Finds the echo that belongs to a wake, if there is one.
 ///
 /// - `is_clear`: whether the line stands out where it was fitted
 pub(crate) fn echo(product: &Product, wake: &Wake, is_clear: bool) -> Option<Echo> {
@@ -169,7 +169,7 @@ pub(crate) fn echo(product: &Product, wake: &Wake, is_clear: bool) -> Option<Ech
     let middle = sorted.len() / 2;
     let sea = *sorted.select_nth_unstable_by(middle, f32::total_cmp).1;
     let width = columns.len();
-    // Of several bright places the one that is brightest for its distance from the tip.
+    // Among bright pixels, prefer bright ones near the tip.
     let score = |n: usize| {
         let value = window.values[n];
         let [row, column] = [n / width, n % width].map(|x| x as f64);
@@ -212,19 +212,19 @@ pub(crate) fn echo(product: &Product, wake: &Wake, is_clear: bool) -> Option<Ech
     })
 }
 
-/// Middle of an echo, and the second moments of its pixels around it.
+/// Middle of an echo, and the second central moments of its pixels.
 #[derive(Debug, Clone, Copy)]
 struct Middle {
     row: f64,
     column: f64,
-    /// Means of the squares of columns and rows, and of their product.
+    /// Variances of columns and rows, and their covariance.
     squares: [f64; 3],
 }
 
 impl Middle {
-    /// The middle of the bright pixels around the brightest one.
+    /// Finds the middle of the bright pixels around the brightest one.
     ///
-    /// All of them count the same: a few scatterers outshine the rest of a ship, and lie anywhere on it.
+    /// All bright pixels have equal weight, because a few strong scatterers, anywhere on the ship, outshine the rest.
     fn of(window: &Window, peak: usize, least: f32) -> Self {
         let (rows, columns) = (window.lines, window.pixels);
         let mut middle = Self {
@@ -263,7 +263,7 @@ impl Middle {
         middle
     }
 
-    /// Half the length along a direction (right, down), as that of a bar: √3 standard deviations.
+    /// Half the length along a direction (right, down), that of a uniform bar: √3 standard deviations.
     fn half_length(&self, [right, down]: [f64; 2]) -> f64 {
         let [xx, yy, xy] = self.squares;
         let variance = right * right * xx + down * down * yy + 2.0 * right * down * xy;
@@ -275,7 +275,8 @@ impl Middle {
 mod tests {
     use super::*;
 
-    /// A wake toward larger range and larger lines: the ship comes toward the radar, and its echo lies further along the flight.
+    /// For a wake toward larger range and larger lines, the ship approaches the radar, and its echo is displaced along the
+    /// flight.
     #[test]
     fn echoes_lie_where_a_ship_that_leaves_the_wake_is_imaged() {
         let across = |direction: [f64; 2], across: f64| Displacements {
@@ -291,13 +292,13 @@ mod tests {
         let place = [500.0, 800.0 + 44.16];
         assert!((wake.of(place) - 441.6).abs() < 1e-9);
         assert!(wake.is_possible(place));
-        // The other way the ship would have to run astern; 40 m/s are too fast.
+        // On the other side the ship would have to run astern; 40 m/s are too fast.
         assert!(!wake.is_possible([500.0, 800.0 - 44.16]));
         assert!(!wake.is_possible([500.0, 800.0 + 220.0]));
         // At another range the axis lies elsewhere.
         assert!((wake.of([508.0, 806.0])).abs() < 1e-9);
         assert!((wake.deviation() - (1.5f64 / 0.8).hypot(1.5) * 10.0 / 115.0).abs() < 1e-12);
-        // Along azimuth nothing can be told, and nothing is ruled out.
+        // If the velocity is too uncertain, no place is ruled out.
         for wake in [
             across([0.3, 0.954], 1.5),
             across([0.8, 0.6], 4.0),

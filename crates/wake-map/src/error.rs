@@ -1,26 +1,26 @@
-//! What can go wrong.
+//! The error type of this crate.
 
 use std::path::PathBuf;
 
-/// Result of this crate.
+/// Result of a fallible function of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// What can go wrong when a product is searched.
+/// A product could not be searched.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The product.
+    /// The product cannot be read.
     #[error(transparent)]
     Product(#[from] wake_geo::Error),
-    /// A file of the search.
+    /// A file of the search cannot be read or written.
     #[error(transparent)]
     File(#[from] whole_files::Error),
-    /// A search that was begun with something else.
+    /// The progress file belongs to a search with other inputs.
     #[error("{} is of another search ({what}); remove it to begin again", path.display())]
     OtherSearch {
-        /// The file that notes how far a search is.
+        /// The progress file.
         path: PathBuf,
-        /// What differs.
+        /// The difference.
         what: String,
     },
 }

@@ -4,8 +4,8 @@ use serde_json::{Map, Value, json};
 
 use crate::wake::MappedWake;
 
-/// A feature collection: a `LineString` from tip to end of each wake, and a `Point` for each echo; wakes without a place are left
-/// out.
+/// Returns a feature collection with a `LineString` from tip to end of each wake and a `Point` for each echo; wakes without a
+/// place on the map are omitted.
 ///
 /// - `image`: name of the image, a property of every feature
 #[must_use]
@@ -38,7 +38,7 @@ pub fn geojson(wakes: &[MappedWake], image: &str) -> Value {
     json!({"type": "FeatureCollection", "features": features})
 }
 
-/// The properties of a wake, with their units in their names.
+/// Properties of a wake, with units in their names.
 pub(crate) fn properties(wake: &MappedWake) -> Map<String, Value> {
     let echo = wake.echo.as_ref();
     let ship = wake.ship.as_ref();

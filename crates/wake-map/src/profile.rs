@@ -1,4 +1,4 @@
-//! The line of a wake at full resolution: where exactly it lies, and how bright it is against the sea beside it.
+//! Position and contrast of a wake's line at full resolution.
 
 use std::ops::Range;
 
@@ -6,7 +6,7 @@ use serde::Serialize;
 use wake_detector::Wake;
 use wake_geo::{Product, Values, Window};
 
-/// What a wake looks like.
+/// Appearance of a wake.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
@@ -14,32 +14,33 @@ pub enum Kind {
     DarkLine,
     /// A line brighter than the sea.
     BrightLine,
-    /// No line that stands out: arms, or a line too weak to be measured.
+    /// No line that stands out: arms, or a line too weak to measure.
     Arms,
 }
 
-/// Half the width of the line \[pixels\], and where the sea beside it begins and ends.
+/// Half the width of the line, and distances between which the sea beside it lies \[pixels\].
 const LINE: i32 = 2;
 const BESIDE: [i32; 2] = [7, 16];
-/// The line begins behind the ship, after a quarter of its length within these bounds \[pixels\]: the echo may lie on the first part,
-/// and the waves beside the ship displace what is seen of it.
+/// Bounds of the first part of the line that is skipped, a quarter of its length \[pixels\]: the echo may lie there, and waves
+/// beside the ship displace the line.
 const BEHIND: [f32; 2] = [10.0, 40.0];
-/// Ends of the part of the line that is fitted \[pixels\]: the part that stands out most tells the axis. Longer parts tell it better, shorter
-/// ones that of a line that fades or bends.
+/// Ends of the fitted part of the line \[pixels\]. The axis is fitted to the part that stands out most: long parts are more
+/// precise, short parts suit lines that fade or bend.
 const ENDS: [i32; 4] = [120, 240, 480, 720];
 const LONGEST: f32 = ENDS[ENDS.len() - 1] as f32;
-/// A contrast of fewer standard deviations is none: the largest of all places, turns and ends reaches four in a sea without wakes.
+/// Lowest significant contrast \[standard deviations\]: on sea without wakes, the largest over all places, turns and ends reaches
+/// four.
 const CLEAR: f64 = 5.0;
-/// Pixels brighter than the median of all around by this factor are of an echo.
+/// Pixels brighter than the median of the surroundings by this factor belong to an echo.
 const ECHO: f64 = 5.0;
-/// How far the line may lie from where it was found, and by which angle it may be turned: pixels and degrees, in steps.
+/// Largest distance of the line from the detected axis \[pixels\], and its largest turn and the step of turns \[degrees\].
 const ASIDE: i32 = 10;
 const TURN: [f32; 2] = [8.0, 0.5];
-/// Distance from the axis as found to the axis turned, as a share of the distance from the tip: more than the sine of the largest turn.
+/// Distance of a turned axis from the detected one as a share of the distance from the tip: above the sine of the largest turn.
 const SPREAD: f32 = 0.15;
-/// Lines parallel to a wake are summed up to this distance from it \[pixels\].
+/// Largest distance from a wake of the parallel lines that are summed \[pixels\].
 const FARTHEST: i32 = ASIDE + BESIDE[1];
-/// A bright line counts less by this factor where a dark one is near it.
+/// Weight of bright lines relative to dark ones.
 const BRIGHT: f64 = 0.5;
 
 /// Pixels around a wake.
@@ -48,11 +49,11 @@ pub(crate) struct Surroundings {
     rows: Range<usize>,
     columns: Range<usize>,
     of_amplitudes: bool,
-    /// Brighter pixels are left out: an echo is no line.
+    /// Brighter pixels are excluded because they belong to echoes.
     brightest: f64,
 }
 
-/// A line through the pixels: its brightness over that of the sea beside it, and how many standard deviations it is off 1.
+/// Brightness of a line over that of the sea beside it, and the deviation of this ratio from 1 in standard deviations.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Contrast {
     ratio: f64,
@@ -60,7 +61,7 @@ pub(crate) struct Contrast {
 }
 
 impl Contrast {
-    /// In decibel.
+    /// Contrast in decibels.
     pub(crate) fn decibel(self) -> f64 {
         10.0 * self.ratio.log10()
     }
@@ -75,7 +76,7 @@ impl Contrast {
 }
 
 impl Surroundings {
-    /// Reads the pixels around a wake; `None` where they cannot be read.
+    /// Reads the pixels around a wake; `None` if they cannot be read.
     pub(crate) fn of(product: &Product, wake: &Wake) -> Option<Self> {
         let margin = FARTHEST as f32 + SPREAD * LONGEST;
         let ends = [wake.at(0.0), wake.at(LONGEST)];
@@ -115,7 +116,7 @@ impl Surroundings {
         })
     }
 
-    /// Power of the pixel at a place, if it is there and of the sea.
+    /// Power of the pixel at a place; `None` outside the window and for echoes.
     fn power(&self, [x, y]: [f32; 2]) -> Option<f64> {
         let [column, row] = [x, y].map(|v| v.round() as i64);
         let column = usize::try_from(column).ok()?;
@@ -156,9 +157,9 @@ impl Surroundings {
         lines
     }
 
-    /// The wake with its axis on the line that stands out most near where it was found; as it was, where none does.
+    /// Moves the wake's axis to the line that stands out most near it; the wake is unchanged if no line stands out.
     ///
-    /// The dark line is the axis, though a bright edge beside it may stand out more.
+    /// Dark lines are preferred: a dark line is the axis, even if a bright edge beside it stands out more.
     pub(crate) fn refined(&self, wake: &Wake) -> (Wake, Option<Contrast>) {
         let mut best: Option<(f64, Wake, Contrast)> = None;
         let turns = (TURN[0] / TURN[1]) as i32;
@@ -197,7 +198,7 @@ impl Surroundings {
     }
 }
 
-/// Sums over the pixels of a line that are there.
+/// Sums over the valid pixels of a line.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
     count: f64,
@@ -222,7 +223,7 @@ impl Sums {
     }
 }
 
-/// The contrast of the line so many pixels to the right of the middle one; `None` where too few pixels are there.
+/// Contrast of the line `aside` pixels to the right of the middle; `None` if there are too few pixels.
 fn contrast(lines: &[Sums], aside: i32) -> Option<Contrast> {
     let middle = FARTHEST + aside;
     let between =
@@ -235,7 +236,7 @@ fn contrast(lines: &[Sums], aside: i32) -> Option<Contrast> {
     }
     let off = beside.power / beside.count;
     let variance = beside.square / beside.count / (off * off) - 1.0;
-    // Pixels are two to a cell of resolution, both ways.
+    // A resolution cell has two pixels along both axes.
     let deviation = (variance.max(1e-6) * 4.0 / line.count).sqrt();
     let ratio = line.power / line.count / off;
     Some(Contrast {
@@ -252,7 +253,7 @@ mod tests {
 
     const SIDE: usize = 900;
 
-    /// Sea of four looks, two pixels to a cell of resolution, times the brightness at each place.
+    /// Sea of four looks with two pixels per resolution cell, times the brightness at each place.
     fn sea(seed: u64, brightness: impl Fn([f32; 2]) -> f32) -> Surroundings {
         let mut random = StdRng::seed_from_u64(seed);
         let mut look = || -(1.0 - random.random::<f32>()).ln() / 4.0;
@@ -303,8 +304,8 @@ mod tests {
         astern && across < 2.5
     }
 
-    /// A short detection, six degrees off and four pixels aside, beside the wake that it crosses: its axis becomes that of the dark line, to half a
-    /// step of the angle and the line's half-width.
+    /// A short detection is six degrees and four pixels off its wake, which another wake crosses: the axis moves to the dark
+    /// line, to within a step of the angle and the line's half-width.
     #[test]
     fn the_axis_is_that_of_the_long_line() {
         let truth = wake([150.0, 120.0], 130.0, 720.0);
@@ -324,7 +325,8 @@ mod tests {
         assert!((line.length - 50.0).abs() < 1e-6);
     }
 
-    /// The track of a ship that turns, of 2,000 pixels' radius, is followed along its first part: no more than half the turn over 240 pixels off.
+    /// The axis follows the first part of a turning ship's track with a radius of 2,000 pixels: it is off by no more than about
+    /// half the turn over 240 pixels.
     #[test]
     fn the_axis_of_a_bent_line_is_that_of_its_first_part() {
         let centre = [150.0, 120.0 + 2000.0];
@@ -335,12 +337,12 @@ mod tests {
         });
         let (line, contrast) = pixels.refined(&wake([150.0, 120.0], 90.0, 200.0));
         assert_eq!(contrast.map(Contrast::kind), Some(Kind::DarkLine));
-        // 240 pixels turn by 6.9 degrees.
+        // The track turns by 6.9 degrees over 240 pixels.
         let turned = line.axis_deg - 90.0;
         assert!((-0.5..4.0).contains(&turned), "{line:?}");
     }
 
-    /// Where there is only sea, a detection stays where it is.
+    /// On sea alone, a detection is unchanged.
     #[test]
     fn without_a_line_nothing_moves() {
         for seed in 0..4 {

@@ -1,4 +1,4 @@
-//! One page with the image, its wakes and a table, that needs no network.
+//! Self-contained HTML page with the image, its wakes and a table.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -9,12 +9,12 @@ use crate::wake::MappedWake;
 
 const PAGE: &str = include_str!("report.html");
 
-/// A page of HTML: the image to pan and zoom, wakes to hover over and to filter by score, a table, and the settings.
+/// Returns an HTML page with the image to pan and zoom, wakes to hover over and to filter by score, a table, and the settings.
 ///
 /// - `title`: name of the image
 /// - `size`: pixels and lines of the image
 /// - `picture`: the image as a PNG file, of any size
-/// - `settings`: names and values to be shown below the table
+/// - `settings`: names and values to show below the table
 #[must_use]
 pub fn html(
     wakes: &[MappedWake],
@@ -39,7 +39,7 @@ pub fn html(
         .map(|(name, value)| ((*name).to_owned(), json!(value)))
         .collect();
     let data = json!({"size": size, "wakes": wakes, "settings": settings}).to_string();
-    // No text of the data can end its element.
+    // Keep text in the data from closing its HTML element.
     let data = data.replace('<', "\\u003c");
     let title: String = title
         .chars()
@@ -50,7 +50,7 @@ pub fn html(
             c => c.to_string(),
         })
         .collect();
-    // The picture last: what it holds is not looked through.
+    // The picture last, so that its content is not searched for the other markers.
     PAGE.replace("TITLE", &title)
         .replace(">DATA<", &format!(">{data}<"))
         .replace("PICTURE", &STANDARD.encode(picture))

@@ -1,9 +1,9 @@
-//! A product as the detector reads it: amplitudes, without land.
+//! Input of the detector from a product: amplitudes, without land.
 
 use wake_detector::Raster;
 use wake_geo::{LandMask, Product, Values};
 
-/// Land is looked up at every so many lines and pixels.
+/// Step of the land mask's look-up \[lines and pixels\].
 const STEP: usize = 8;
 
 /// The sea of a product.
@@ -14,7 +14,7 @@ pub(crate) struct SeaOf<'a> {
 }
 
 impl SeaOf<'_> {
-    /// Whether the square of pixels around a place of the window is land.
+    /// Whether a pixel of the product is land; places outside are clamped to the last line and pixel.
     fn is_land(&self, line: usize, pixel: usize) -> bool {
         let Some(land) = self.land else { return false };
         let (lines, pixels) = self.product.size();

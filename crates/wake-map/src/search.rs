@@ -1,4 +1,4 @@
-//! The search of a product, tile by tile.
+//! Search of a product, tile by tile.
 
 use std::path::Path;
 
@@ -11,28 +11,28 @@ use crate::error::Result;
 use crate::sea::SeaOf;
 use crate::state::State;
 
-/// Tiles searched at a time, however many threads there are: 170 MB each.
+/// Number of tiles searched at once, whatever the number of threads; each takes 170 MB.
 const AT_ONCE: usize = 8;
 
-/// How a product is searched.
+/// Options of the search of a product.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Search<'a> {
-    /// Land that is left out.
+    /// Land to exclude.
     pub land: Option<&'a LandMask>,
-    /// A file that notes every tile that was searched; a search that was stopped goes on from it.
+    /// File that records each searched tile; an interrupted search continues from it.
     pub state: Option<&'a Path>,
-    /// What else the search depends on, such as the weights and the least score: a file that notes something else is refused.
+    /// Other inputs of the search, such as the weights and the lowest score; a file with other settings is refused.
     pub settings: &'a str,
 }
 
-/// The wakes of a product, the surest first, in its lines and pixels.
+/// Returns the wakes of a product in descending order of score, in its lines and pixels.
 ///
-/// - `done`: called after every tile with the number of tiles done and in all; may be called by several threads
+/// - `done`: called at the start and after every tile with the numbers of finished tiles and of all tiles, from any thread
 ///
 /// # Errors
 ///
 /// [`Error::Product`](crate::Error::Product) for pixels that cannot be read, [`Error::OtherSearch`](crate::Error::OtherSearch)
-/// for a file of another search, [`Error::File`](crate::Error::File) for one that cannot be written.
+/// for a file of another search, [`Error::File`](crate::Error::File) for a file that cannot be read or written.
 pub fn search(
     product: &Product,
     detector: &Detector,

@@ -1,4 +1,4 @@
-//! Detections at full resolution: where exactly a wake lies and begins, and which of them are of one ship.
+//! Refinement of detections at full resolution: axis and start of each wake, and removal of duplicates of one ship.
 
 use wake_detector::{Detection, Wake};
 use wake_geo::Product;
@@ -6,31 +6,32 @@ use wake_geo::Product;
 use crate::echo::{Echo, ShipOnAxis, echo};
 use crate::profile::{Contrast, Kind, Surroundings};
 
-/// A detection, and what the pixels around it show.
+/// A detection with its measurements at full resolution.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Seen {
     pub(crate) detection: Detection,
-    /// The wake on its line, from the stern.
+    /// The wake on its refined line, from the stern.
     pub(crate) wake: Wake,
     pub(crate) measured: Option<Contrast>,
     pub(crate) echo: Option<Echo>,
 }
 
-/// The tip of a wake moves no farther along its axis, to where the echo says that the stern is \[pixels\].
+/// Largest shift of a wake's tip along its axis to the stern, given by the echo \[pixels\].
 const FARTHEST: f64 = 60.0;
-/// The length that the detector measured is that of a line turned by at most this angle \[degrees\].
+/// Largest turn of the line for which the length measured by the detector is kept \[degrees\].
 const MEASURED: f32 = 3.0;
-/// Echoes closer than this are one \[pixels\], and wakes that lead to it one if their axes differ by less \[degrees\].
+/// Echoes closer than this are the same \[pixels\], and wakes with the same echo are the same if their axes differ by less
+/// \[degrees\].
 const SAME_ECHO: f64 = 6.0;
 const SAME_AXIS: f32 = 30.0;
-/// A wake without an echo is the later part of a surer one whose axis it lies on, also if tip and end are taken for each other: so far astern
-/// of the tip, so far off the axis, and by this share of the distance farther \[pixels\], and turned by less \[degrees\].
+/// A wake without an echo is a later part of a wake with a higher score, in either direction, if its tip is within these bounds:
+/// distance astern and distance from the axis \[pixels\], growth of the latter per distance astern, and turn \[degrees\].
 const ASTERN: f32 = 600.0;
 const OFF: f32 = 12.0;
 const SPREAD: f32 = 0.03;
 const TURNED: f32 = 8.0;
-/// A line without an echo that ends this close to the tip of a surer wake leads to that ship, not from another one \[pixels\], if its axis
-/// differs by less \[degrees\]: arms, 19.5 degrees off the axis, seen together with what lies ahead of the bow.
+/// A line without an echo that ends this close to the tip of a wake with a higher score \[pixels\] belongs to that ship if the
+/// axes differ by less \[degrees\]: arms, 19.5 degrees off the axis, detected together with features ahead of the bow.
 const AT_TIP: f32 = 25.0;
 const AHEAD: f32 = 23.0;
 
@@ -50,7 +51,7 @@ impl Seen {
         }
     }
 
-    /// The wake to the measured end of its line, where it was measured.
+    /// The wake up to the measured end of its line, if that was measured.
     pub(crate) fn visible(&self) -> Wake {
         let Some(extent) = self.detection.extent else {
             return self.wake;
@@ -64,7 +65,7 @@ impl Seen {
         }
     }
 
-    /// Whether another detection, which is less sure, is of the same wake.
+    /// Whether another detection with a lower score is the same wake.
     fn is_again(&self, other: &Self) -> bool {
         let turn = turn(&self.wake, &other.wake);
         match (&self.echo, &other.echo) {
@@ -88,7 +89,7 @@ impl Seen {
     }
 }
 
-/// A detection without its measured length, if the line is turned too far against the axis of that measurement.
+/// Drops the measured length of a detection if the refined line is turned too far from the axis of that measurement.
 fn measured_along(mut detection: Detection, line: &Wake) -> Detection {
     if turn(&detection.wake, line) > MEASURED {
         detection.extent = None;
@@ -101,8 +102,8 @@ fn turn(a: &Wake, b: &Wake) -> f32 {
     ((b.axis_deg - a.axis_deg + 180.0).rem_euclid(360.0) - 180.0).abs()
 }
 
-/// A wake that was found, on its line as the pixels have it, and beginning at the stern of the ship where its echo says where
-/// that is; its length changes by as much.
+/// Places a detected wake on its refined line, starting at the ship's stern if the echo gives it; the length changes by the
+/// same shift.
 fn placed(found: &Wake, line: &Wake, ship: Option<ShipOnAxis>) -> Wake {
     let mut placed = Wake {
         tip: line.tip,
@@ -122,7 +123,7 @@ fn placed(found: &Wake, line: &Wake, ship: Option<ShipOnAxis>) -> Wake {
     placed
 }
 
-/// Detections, the surest first, without those that are of the wake of a surer one; what they see of it makes it longer.
+/// Removes duplicates from detections in descending order of score; a duplicate may lengthen the wake that is kept.
 pub(crate) fn one_a_ship(seen: Vec<Seen>) -> Vec<Seen> {
     let mut kept: Vec<Seen> = Vec::new();
     for one in seen {
@@ -176,8 +177,8 @@ mod tests {
         }
     }
 
-    /// A wake to the right from (500, 500): a detection of its later part makes it longer, one of it in reverse, one that leads to its echo and one
-    /// that ends at its tip go; a wake beside it, one across it, and one with an echo of its own are of other ships.
+    /// A wake to the right from (500, 500): a detection of its later part lengthens it; a reversed one, one with the same echo
+    /// and one that ends at its tip are removed; a parallel wake, a crossing wake and one with its own echo are of other ships.
     #[test]
     fn a_ship_has_one_wake() {
         let echo = Some([505.0, 560.0]);
@@ -211,7 +212,7 @@ mod tests {
         assert!((kept[1].wake.length - 100.0).abs() < 1e-6);
     }
 
-    /// The end of a line stays where it was measured, wherever the wake begins.
+    /// The measured end of a line stays in place wherever the wake begins.
     #[test]
     fn a_wake_ends_where_it_was_measured() {
         let mut one = seen(0.9, [480.0, 500.0], 90.0, None);
@@ -227,7 +228,7 @@ mod tests {
         assert!((one.detection.measured().wake.length - 250.0).abs() < 1e-6);
     }
 
-    /// A length is that of its axis: two degrees beside it, across north too, but not four.
+    /// A measured length is kept for turns of two degrees, also across north, but not for four.
     #[test]
     fn a_turned_wake_has_another_length() {
         let mut one = Detection::new(0.9, wake([480.0, 500.0], 1.0));
@@ -241,8 +242,8 @@ mod tests {
         }
     }
 
-    /// A line to the right that was found 5 pixels too high and 20 ahead of a ship of 30 pixels: its wake begins at the stern, and
-    /// its end stays. A ship too far away moves nothing.
+    /// A line to the right that was detected 5 pixels too high and 20 pixels ahead of the stern of a 30-pixel ship: the wake is
+    /// moved to begin at the stern, with the same end. A ship too far away changes nothing.
     #[test]
     fn a_wake_begins_at_the_stern() {
         let found = wake([480.0, 495.0], 90.0);

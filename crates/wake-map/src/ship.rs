@@ -1,4 +1,4 @@
-//! Ship and wind, as an estimator tells them.
+//! Estimates of ship and wind.
 
 use serde::Serialize;
 
@@ -7,7 +7,7 @@ use serde::Serialize;
 pub struct EstimatedShip {
     /// True if the estimate passed its tests; otherwise do not use the other values.
     pub identifiable: bool,
-    /// Speed through the water \[m/s\], and its standard deviation.
+    /// Speed through the water \[m/s\].
     pub speed: f64,
     /// Standard deviation of the speed \[m/s\].
     pub speed_deviation: f64,
@@ -19,7 +19,7 @@ pub struct EstimatedShip {
     pub wind_speed: f64,
     /// Standard deviation of the wind speed \[m/s\].
     pub wind_speed_deviation: f64,
-    /// Where the wind blows to, clockwise from true north \[degrees\]; it may be reversed.
+    /// Direction that the wind blows toward, clockwise from true north \[degrees\]; it may be reversed.
     pub wind_toward: f64,
     /// Largest misfit of the residual spectrum, as a factor.
     pub misfit: f64,

@@ -1,4 +1,4 @@
-//! How far a search is: a file with a line for every tile that was searched.
+//! Progress of a search: a file with one line per searched tile.
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
@@ -12,7 +12,7 @@ use wake_detector::{Detection, Extent, Wake};
 
 use crate::error::{Error, Result};
 
-/// A wake as the file has it.
+/// A wake in the file.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Line {
     score: f32,
@@ -33,7 +33,7 @@ struct Tile {
     found: Vec<Line>,
 }
 
-/// The tiles that were searched, in memory and in a file.
+/// Searched tiles, in memory and in a file.
 #[derive(Debug)]
 pub(crate) struct State {
     path: PathBuf,
@@ -42,9 +42,9 @@ pub(crate) struct State {
 }
 
 impl State {
-    /// Opens the file of a search, or begins it; half a line at its end, which a kill left, is dropped.
+    /// Opens or creates the file of a search; an incomplete last line, left by a killed run, is dropped.
     ///
-    /// - `identity`: what the search is of, the first line of the file
+    /// - `identity`: inputs of the search, the first line of the file
     pub(crate) fn open(path: &Path, identity: &Value) -> Result<Self> {
         let text = match path.exists() {
             true => String::from_utf8_lossy(&whole_files::read_bytes(path)?).into_owned(),
@@ -63,7 +63,7 @@ impl State {
                 });
             }
             for line in lines {
-                // A damaged line is searched again.
+                // Tiles of damaged lines are searched again.
                 if let Ok(tile) = serde_json::from_str::<Tile>(line) {
                     done.insert(tile.tile, tile.found.iter().map(Line::detection).collect());
                 }
@@ -82,7 +82,7 @@ impl State {
         })
     }
 
-    /// Notes the wakes of a tile.
+    /// Records the wakes of a tile.
     pub(crate) fn note(&self, tile: usize, found: &[Detection]) -> Result<()> {
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
         let written = file.write_all(line(tile, found).as_bytes());
@@ -104,7 +104,7 @@ fn line(tile: usize, found: &[Detection]) -> String {
     line.unwrap_or_default() + "\n"
 }
 
-/// The first key in which two identities differ.
+/// Description of the first key in which two identities differ.
 fn differs(there: &Value, here: &Value) -> String {
     let keys = here.as_object().into_iter().flatten();
     let mut keys = keys.filter(|(key, value)| there.get(key.as_str()) != Some(*value));
@@ -173,7 +173,7 @@ mod tests {
         state.note(7, &[wake.detection()]).unwrap();
         state.note(2, &[]).unwrap();
         drop(state);
-        // A kill leaves half a line.
+        // An incomplete line, as left by a killed run.
         let mut text = std::fs::read(&path).unwrap();
         text.extend(b"{\"tile\": 9, \"fou");
         std::fs::write(&path, text).unwrap();

@@ -1,4 +1,4 @@
-//! Wakes as a table.
+//! Wakes as a CSV table.
 
 use serde_json::Value;
 
@@ -35,7 +35,7 @@ const COLUMNS: [&str; 26] = [
     "misfit",
 ];
 
-/// Comma-separated values with a header: a line for each wake, the surest first; what is not known is empty.
+/// Returns comma-separated values with a header and one line per wake, in the given order; unknown values are empty.
 #[must_use]
 pub fn csv(wakes: &[MappedWake]) -> String {
     let places = ["longitude", "latitude", "end_longitude", "end_latitude"];

@@ -1,4 +1,4 @@
-//! A wake as a place on the map.
+//! Wakes on the map.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -11,10 +11,10 @@ use crate::profile::{Contrast, Kind};
 use crate::seen::{Seen, one_a_ship};
 use crate::ship::EstimatedShip;
 
-/// A wake with all that is known of it.
+/// A wake with its position on the map and its measurements.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MappedWake {
-    /// Order of the detections, 0 to 1; not a probability.
+    /// Score for ranking detections, 0 to 1; not a probability.
     pub score: f64,
     /// Probability of a wake, in either direction; `None` for a detector without calibration.
     pub probability: Option<f64>,
@@ -26,9 +26,9 @@ pub struct MappedWake {
     pub line: f64,
     /// Pixel of the tip.
     pub pixel: f64,
-    /// (Longitude, latitude) of the tip \[degrees\]; `None` for an image without places.
+    /// (Longitude, latitude) of the tip \[degrees\]; `None` for an image without geolocation.
     pub tip: Option<[f64; 2]>,
-    /// (Longitude, latitude) of the end of what is seen \[degrees\].
+    /// (Longitude, latitude) of the visible end \[degrees\].
     pub end: Option<[f64; 2]>,
     /// Direction of the ship, from the end of the wake to its tip, clockwise from true north \[degrees\]; see
     /// `direction_probability`.
@@ -37,7 +37,7 @@ pub struct MappedWake {
     pub length: Option<f64>,
     /// Standard deviation of the visible length \[m\].
     pub length_deviation: Option<f64>,
-    /// (Pixel, line) of the end of what is seen.
+    /// (Pixel, line) of the visible end.
     pub end_px: [f64; 2],
     /// Visible length \[pixels\].
     pub length_px: f64,
@@ -45,7 +45,7 @@ pub struct MappedWake {
     pub half_angle: f64,
     /// Contrast of the line against the sea on both sides \[dB\].
     pub contrast_db: Option<f64>,
-    /// What it looks like.
+    /// Appearance of the wake.
     pub kind: Option<Kind>,
     /// Incidence angle at the tip \[degrees\].
     pub incidence: Option<f64>,
@@ -53,15 +53,15 @@ pub struct MappedWake {
     pub time: Option<String>,
     /// The ship's echo.
     pub echo: Option<Echo>,
-    /// Ship and wind, if the caller estimates them.
+    /// Ship and wind, if estimated by the caller.
     pub ship: Option<EstimatedShip>,
 }
 
-/// The wakes of a product with all that is known of them, the surest first; further detections of a ship's wake are left out.
+/// Measures and maps detections of a product, given in descending order of score, without duplicates of one ship's wake.
 ///
 /// # Errors
 ///
-/// [`Error::Product`](crate::Error::Product) for places that cannot be computed.
+/// [`Error::Product`](crate::Error::Product) for positions that cannot be computed.
 pub fn mapped(product: &Product, found: &[Detection]) -> Result<Vec<MappedWake>> {
     let seen: Vec<Seen> = found.par_iter().map(|one| Seen::of(product, one)).collect();
     let ships = one_a_ship(seen);

@@ -1,4 +1,4 @@
-//! Activations: burn's formulas, computed by kernels of our own on burn's CPU backend.
+//! Activation functions: burn's formulas, computed by the crate's own kernels on burn's CPU backend.
 
 use burn::tensor::Tensor;
 use burn::tensor::activation::{gelu as fused_gelu, sigmoid, silu as fused_silu};
@@ -63,7 +63,7 @@ pub fn quick_gelu<const D: usize>(x: Tensor<D>) -> Tensor<D> {
 /// ```
 ///
 /// The fused operation of most backends differentiates the tanh approximation instead, which is off by
-/// about 1e-4; where gradients are wanted, the formula is therefore spelled out.
+/// about 1e-4; the formula is therefore written out when gradients are needed.
 ///
 /// # References
 ///
@@ -79,7 +79,7 @@ pub fn gelu<const D: usize>(x: Tensor<D>) -> Tensor<D> {
     ((x.clone() * std::f64::consts::FRAC_1_SQRT_2).erf() + 1.0) * x * 0.5
 }
 
-/// The gate of a feed-forward layer.
+/// Gated GELU of a feed-forward layer.
 ///
 /// ```text
 /// y = a ⊙ gelu(b),   x = (a, b)
@@ -111,12 +111,12 @@ mod native {
     use crate::kernels::pointwise;
     use crate::operation::{Operation, apply};
 
-    /// `None` where the tensor is elsewhere.
+    /// `None` unless the tensor is in f32 on burn's CPU backend.
     pub(super) fn map<const D: usize>(x: &Tensor<D>, curve: Curve) -> Option<Tensor<D>> {
         apply(curve, [x.clone().into_dispatch()], x.dims())
     }
 
-    /// `None` where the tensor is elsewhere.
+    /// `None` unless the tensor is in f32 on burn's CPU backend.
     pub(super) fn gate(x: &Tensor<3>, inner: usize) -> Option<Tensor<3>> {
         let [batch, tokens, _] = x.dims();
         apply(

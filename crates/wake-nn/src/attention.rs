@@ -9,14 +9,14 @@ use burn::tensor::{DType, Device, Tensor};
 use super::linear::linear;
 use super::{cast_to, is_half};
 
-/// Attention of several heads, each seeing an equal share of the channels.
+/// Multi-head attention, with an equal share of the channels for each head.
 ///
 /// ```text
 /// head_h = softmax(Q_h K_hᵀ / √d) V_h
 /// ```
 ///
 /// - `d`: channels per head
-/// - `causal`: position i sees only positions 0…i
+/// - `causal`: position i attends only to positions 0…i
 ///
 /// Half-precision inputs are widened to f32 for the products and the softmax, so that logits
 /// beyond 65,504 stay finite, and narrowed again.
@@ -68,7 +68,7 @@ fn split_heads(x: Tensor<3>, heads: usize) -> Tensor<4> {
         .swap_dims(1, 2)
 }
 
-/// Attention of the U-Net and the autoencoder: to itself, or to a context such as a prompt.
+/// Attention of the U-Net and the autoencoder: self-attention, or attention to a context such as a prompt.
 #[derive(Module, Debug)]
 pub struct CrossAttention {
     to_q: Linear,
@@ -101,9 +101,9 @@ impl CrossAttention {
         }
     }
 
-    /// Attends from `x` to `context`, or to `x` itself where there is none.
+    /// Attends from `x` to `context`, or to `x` itself without a context.
     ///
-    /// The softmax over a single token is 1: all of `x` then sees its value, and nothing else is computed.
+    /// The softmax over a single token is 1: every token of `x` then gets that token's value, and nothing else is computed.
     ///
     /// # Shapes
     ///
@@ -124,7 +124,7 @@ impl CrossAttention {
     }
 }
 
-/// The same a block of queries at a time on burn's CPU backend.
+/// Attention on burn's CPU backend, one block of queries at a time.
 #[cfg(feature = "flex")]
 mod native {
     use super::*;
@@ -132,14 +132,14 @@ mod native {
     use crate::operation::{Operation, apply, values_of};
     use burn::backend::flex::FlexTensor;
 
-    /// Results of the forward pass that the gradients need beside the inputs.
+    /// Results of the forward pass that the gradients need in addition to the inputs.
     #[derive(Debug, Clone)]
     pub(crate) struct Saved {
         softmax: Vec<Softmax>,
         result: Option<FlexTensor>,
     }
 
-    /// `None` where the tensors are elsewhere.
+    /// `None` unless the tensors are in f32 on burn's CPU backend.
     pub(super) fn attention(
         inputs: [&Tensor<3>; 3],
         heads: usize,
@@ -198,7 +198,7 @@ mod tests {
     use super::*;
     use crate::noise::{NoiseSource, normal_batch};
 
-    /// A token beside its copy shares its weight, whatever the queries: the same numbers by the long way.
+    /// A single token gives the same result as two copies of it, which take the full computation.
     #[test]
     fn a_single_token_is_seen_as_two_of_it_are() {
         let device = Device::flex();
@@ -211,7 +211,7 @@ mod tests {
         let one = layer.forward(x.clone(), Some(token.clone()));
         let two = layer.forward(x, Some(token.repeat_dim(1, 2)));
         assert_eq!(one.dims(), [1, 5, 8]);
-        // Numbers around 1, a few roundings of 6e-8 each.
+        // Values are around 1, with a few roundings of 6e-8 each.
         assert!((one - two).abs().max().into_scalar::<f32>() < 1e-6);
     }
 }

@@ -1,10 +1,10 @@
-//! Convolutions: burn's layers, computed by kernels of our own on burn's CPU backend.
+//! Convolutions: burn's layers, computed by the crate's own kernels on burn's CPU backend.
 
 use burn::nn::PaddingConfig2d;
 use burn::nn::conv::{Conv2d, Conv2dConfig};
 use burn::tensor::{Device, Tensor};
 
-/// A convolution that keeps the size of its image: 3 × 3 with a border of one zero.
+/// A 3 × 3 convolution that keeps the size of the image, with a border of one zero.
 pub fn conv3x3(channels_in: usize, channels_out: usize, device: &Device) -> Conv2d {
     Conv2dConfig::new([channels_in, channels_out], [3, 3])
         .with_padding(PaddingConfig2d::Explicit(1, 1, 1, 1))
@@ -35,7 +35,7 @@ mod native {
     use crate::kernels::conv::{self, Geometry};
     use crate::operation::{Operation, apply};
 
-    /// `None` where the tensors are elsewhere, or the layer is of another kind.
+    /// `None` unless the tensors are in f32 on burn's CPU backend and the kernels support the layer.
     pub(super) fn convolve(layer: &Conv2d, x: &Tensor<4>) -> Option<Tensor<4>> {
         let geometry = geometry(layer, x.dims())?;
         let [rows, columns] = geometry.size_out();
@@ -48,7 +48,7 @@ mod native {
         }
     }
 
-    /// The sizes of a layer with a square kernel on images of these sizes.
+    /// Sizes of a layer with a square kernel on images of these dimensions; `None` for other layers.
     fn geometry(layer: &Conv2d, dims: [usize; 4]) -> Option<Geometry> {
         let [batch, channels_in, rows, columns] = dims;
         let [channels_out, kernel_channels, kernel, kernel_columns] = layer.weight.dims();

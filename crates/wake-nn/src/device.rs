@@ -1,4 +1,4 @@
-//! Devices by the names that a command line or a settings file gives them.
+//! Devices by name, as given on a command line or in a settings file.
 
 use burn::tensor::Device;
 #[cfg(feature = "wgpu")]
@@ -8,7 +8,7 @@ use burn::tensor::DeviceType;
 
 use crate::error::{Error, Result};
 
-/// The backends that are compiled in.
+/// Backends compiled into this build.
 const BACKENDS: &[&str] = &[
     #[cfg(feature = "flex")]
     "flex",
@@ -20,9 +20,9 @@ const BACKENDS: &[&str] = &[
     "cuda",
 ];
 
-/// The device of a name: `flex`, `ndarray`, `wgpu` or `cuda`, where that feature is on.
+/// Returns the device with a name: `flex`, `ndarray`, `wgpu` or `cuda`, if that feature is enabled.
 ///
-/// A GPU's number may follow, as in `cuda:1`: CUDA's own number, or that of a discrete GPU for `wgpu`. Without a
+/// A GPU's number may follow, as in `cuda:1`: CUDA's own number or, for `wgpu`, the number of a discrete GPU. Without a
 /// number, `cuda` is `cuda:0` and `wgpu` is the GPU that burn chooses.
 ///
 /// ```
@@ -32,7 +32,7 @@ const BACKENDS: &[&str] = &[
 ///
 /// # Errors
 ///
-/// [`Error::UnknownDevice`] with the names that this build knows; [`Error::NoDevice`] if this machine has no such GPU.
+/// [`Error::UnknownDevice`] with the names that this build supports; [`Error::NoDevice`] if this machine has no such GPU.
 pub fn device_named(name: &str) -> Result<Device> {
     let unknown = || Error::UnknownDevice {
         name: name.to_owned(),
@@ -72,9 +72,9 @@ pub fn device_named(name: &str) -> Result<Device> {
     }
 }
 
-/// An error where this machine lacks a GPU: to use it would panic.
+/// Returns an error if this machine lacks a GPU, because using it would panic.
 ///
-/// - `found`: devices that the backend has here
+/// - `found`: number of devices that the backend finds
 #[cfg(any(feature = "wgpu", feature = "cuda"))]
 fn there(name: &str, found: usize, is_there: bool) -> Result<()> {
     match is_there {
@@ -86,7 +86,7 @@ fn there(name: &str, found: usize, is_there: bool) -> Result<()> {
     }
 }
 
-/// Whether a device is a CPU, where compilers, not drivers, make the code.
+/// Whether a device is a CPU, whose code is made by compilers and not by drivers.
 pub fn is_cpu(device: &Device) -> bool {
     let cpus: &[Device] = &[
         #[cfg(feature = "flex")]

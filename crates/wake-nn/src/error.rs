@@ -1,4 +1,4 @@
-//! The one error type of this crate.
+//! The error type of this crate.
 
 use std::path::PathBuf;
 use whole_files::{quoted, sentence};
@@ -6,15 +6,15 @@ use whole_files::{quoted, sentence};
 /// Result of the functions of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// Why a model could not be built, read, written or run.
+/// Failure to build, read, write or run a model.
 ///
-/// Wrong shapes handed to a model are mistakes of the program and panic; files, options and numbers
+/// Passing wrong shapes to a model is a programming error and panics; files, options and numbers
 /// that a user chose are reported here.
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the message names every field")]
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// An option that would change the numbers, and that this crate does not implement.
+    /// An option that would change the numbers and is not implemented in this crate.
     #[error(
         "{} = {} is not supported; supported: {supported}",
         quoted(option),
@@ -26,7 +26,7 @@ pub enum Error {
         supported: String,
     },
 
-    /// A number outside the closed range in which it means something.
+    /// A number outside its valid closed range.
     #[error("{name} is {value}, outside [{min}, {max}]")]
     OutOfRange {
         name: String,
@@ -35,7 +35,7 @@ pub enum Error {
         max: f64,
     },
 
-    /// An option of the wrong kind, or at odds with another one.
+    /// An option of the wrong type, or one that conflicts with another.
     #[error("{} is {}, expected {expected}", quoted(option), sentence(value))]
     InvalidOption {
         option: String,
@@ -51,21 +51,21 @@ pub enum Error {
         source: std::io::Error,
     },
 
-    /// None of the file names that a folder may hold was found.
+    /// A folder holds none of the expected files.
     #[error("{} holds none of: {}", folder.display(), expected.join(", "))]
     MissingFile {
         folder: PathBuf,
         expected: Vec<String>,
     },
 
-    /// A file that should hold JSON does not.
+    /// A file is not valid JSON.
     #[error("{} is not valid JSON: {}", path.display(), sentence(&source.to_string()))]
     Json {
         path: PathBuf,
         source: serde_json::Error,
     },
 
-    /// A weight file breaks the safetensors format, so nothing in it is trusted.
+    /// A weight file breaks the safetensors format, so nothing in it is used.
     #[error("{} is not a valid safetensors file: {}", path.display(), sentence(&reason.to_string()))]
     InvalidSafetensors {
         path: PathBuf,
@@ -73,7 +73,7 @@ pub enum Error {
         reason: Box<dyn std::error::Error + Send + Sync>,
     },
 
-    /// A weight that no training gives.
+    /// A weight is not finite.
     #[error("{} is damaged: tensor {} holds {value}; all weights must be finite", path.display(), quoted(tensor))]
     InvalidWeight {
         path: PathBuf,
@@ -81,21 +81,21 @@ pub enum Error {
         value: f64,
     },
 
-    /// The tensors of a file are not those of the model; nothing was loaded.
+    /// The tensors of a file do not match those of the model; nothing was loaded.
     #[error("{} does not fit the model: {mismatch}", path.display())]
     WeightsMismatch {
         path: PathBuf,
         mismatch: Box<Mismatch>,
     },
 
-    /// The device cannot hold or compute this kind of number.
+    /// The device does not support this floating-point type.
     #[error("device {device} cannot compute in {precision}; use f32")]
     UnsupportedPrecision {
         device: String,
         precision: &'static str,
     },
 
-    /// No backend of this build has a device of this name.
+    /// No backend of this build has a device with this name.
     #[error(
         "there is no device '{}' in this build: it has {}; the features flex, ndarray, wgpu and cuda add others, \
          and a GPU's number may follow, as in cuda:1",
@@ -114,15 +114,15 @@ pub enum Error {
     )]
     NoDevice {
         name: String,
-        /// Devices that the backend finds.
+        /// Number of devices that the backend finds.
         found: usize,
     },
 
-    /// A model's numbers have overflowed, or are none.
+    /// A model produced numbers that are infinite or NaN.
     #[error("{what} holds numbers that are not finite: the weights do not fit, or are damaged")]
     NotFinite { what: String },
 
-    /// A device computes other numbers than the reference backend.
+    /// The results of a device differ from those of the reference backend.
     #[error(
         "device {device} computes wrong numbers: {stage} differs by {difference:e} of its largest \
          value, allowed {allowed:e}; use another device or driver"
@@ -145,14 +145,14 @@ impl From<whole_files::Error> for Error {
     }
 }
 
-/// Which tensors of a weight file do not fit a model.
+/// Tensors of a weight file that do not fit a model.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Mismatch {
     /// Tensors that the model has and the file lacks.
     pub missing: Vec<String>,
-    /// Tensors that the file has and the model does not know.
+    /// Tensors that the file has and the model does not.
     pub unexpected: Vec<String>,
-    /// Tensors that both have, in different shapes or as a kind of number that is no weight.
+    /// Tensors that both have, with different shapes or with a number type that is not one of weights.
     pub misshapen: Vec<Misshapen>,
 }
 
@@ -168,13 +168,13 @@ pub struct Misshapen {
 }
 
 impl Mismatch {
-    /// Whether file and model agree.
+    /// Whether the file and the model agree.
     pub fn is_empty(&self) -> bool {
         self.missing.is_empty() && self.unexpected.is_empty() && self.misshapen.is_empty()
     }
 }
 
-/// How many names of each kind a message spells out; the fields hold all of them.
+/// Largest number of names of each kind in a message; the fields hold all of them.
 const SHOWN: usize = 6;
 
 impl std::fmt::Display for Mismatch {
@@ -239,7 +239,7 @@ pub fn check_range(name: &str, value: f64, min: f64, max: f64) -> Result<()> {
 mod tests {
     use super::*;
 
-    /// What others wrote reaches a terminal in short lines without control characters.
+    /// Text from files reaches a terminal in short lines without control characters.
     #[test]
     fn foreign_text_is_escaped_and_cut() {
         let foreign = format!("\u{1b}[31m\0\u{7}\n{}", "x".repeat(100_000));

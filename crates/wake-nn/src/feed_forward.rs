@@ -7,7 +7,7 @@ use burn::tensor::{Device, Tensor};
 use super::activation::geglu;
 use super::linear::linear;
 
-/// Widens every token to four times its channels, gates, and narrows again.
+/// Gated feed-forward layer, which widens every token to four times its channels and narrows it again.
 ///
 /// ```text
 /// y = (a ⊙ gelu(b)) W_out,   (a, b) = x W_proj

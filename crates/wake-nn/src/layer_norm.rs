@@ -1,12 +1,12 @@
-//! Layer normalisation: burn's layer, computed by kernels of our own on burn's CPU backend.
+//! Layer normalisation: burn's layer, computed by the crate's own kernels on burn's CPU backend.
 
 use burn::nn::LayerNorm;
 use burn::tensor::Tensor;
 
-/// ε of the normalisations that [`layer_norm`] is applied to: burn's and PyTorch's default.
+/// ε of the normalisations computed by [`layer_norm`], the default of burn and PyTorch.
 pub(super) const EPSILON: f64 = 1e-5;
 
-/// Normalises every token: as `LayerNorm::forward`, and faster with gradients on burn's CPU backend.
+/// Normalises every token as `LayerNorm::forward` does, but faster with gradients on burn's CPU backend.
 ///
 /// # Shapes
 ///
@@ -28,7 +28,7 @@ mod native {
     #[derive(Debug, Clone, Copy)]
     struct Normalization;
 
-    /// `None` where the tensors are elsewhere, or the layer has no bias.
+    /// `None` unless the tensors are in f32 on burn's CPU backend and the layer has a bias.
     pub(super) fn normalize(layer: &LayerNorm, x: &Tensor<3>) -> Option<Tensor<3>> {
         let [weight, bias] = [&layer.gamma, layer.beta.as_ref()?].map(|p| p.val());
         let inputs = [
@@ -70,7 +70,7 @@ mod tests {
     use burn::nn::LayerNormConfig;
     use burn::tensor::Device;
 
-    /// Results and all gradients beside burn's, for numbers of channels and tokens that fill vectors and parts, and for others.
+    /// Results and gradients against burn's, for sizes that fill vectors and parts and for sizes that do not.
     #[test]
     fn layers_are_those_of_burn() {
         let device = Device::flex().autodiff();
@@ -91,7 +91,7 @@ mod tests {
             let seen = |apply: &dyn Fn(Tensor<3>) -> Tensor<3>| -> [Vec<f32>; 4] {
                 let x = x.clone().require_grad();
                 let y = apply(x.clone());
-                // The gradient of the result is the result: unlike everywhere.
+                // This loss makes the result its own gradient, which differs everywhere.
                 let gradients = y.clone().square().sum().mul_scalar(0.5).backward();
                 let parameters = [&layer.gamma, layer.beta.as_ref().unwrap()];
                 let [weight, bias] = parameters.map(|p| p.val().grad(&gradients).unwrap());
@@ -119,12 +119,12 @@ mod tests {
         }
     }
 
-    /// Largest difference between two orders of summation, in `y` and in the gradients of `½ Σ y²` by x, weight and bias.
+    /// Largest difference between two orders of summation, in `y` and in the gradients of `½ Σ y²` for x, weight and bias.
     ///
-    /// A token's mean μ and deviation σ are sums of as many terms as there are channels, so that x̂ = (x − μ)/σ is
-    /// uncertain by u = terms · ε · max|x|/σ · max(1, x̂²), and y by γ u. The gradient by x is γ (y − …)/σ, three
-    /// terms that cancel: its size says nothing of its error, that of the terms does. (Three channels have only two
-    /// degrees of freedom that a normalisation leaves at one: there it nearly vanishes.)
+    /// A token's mean μ and deviation σ are sums of as many terms as there are channels, so x̂ = (x − μ)/σ is uncertain by
+    /// u = terms · ε · max|x|/σ · max(1, x̂²), and y by γ u. The gradient with respect to x is γ (y − …)/σ, three terms that
+    /// cancel: its error follows from the size of the terms, not from its own. (With three channels, normalisation leaves one
+    /// degree of freedom of two, and the gradient nearly vanishes.)
     fn roundings(x: &[f32], gamma: &[f32], y: &[f32]) -> [f32; 4] {
         let largest = |values: &[f32]| values.iter().fold(0f32, |m, v| m.max(v.abs()));
         let channels = gamma.len() as f32;

@@ -3,7 +3,9 @@
 use burn::nn::Linear;
 use burn::tensor::Tensor;
 
-/// Applies a linear layer to every token, `y = x W + b`: as `Linear::forward`, and faster for large layers on burn's CPU backend.
+/// Applies a linear layer to every token, `y = x W + b`.
+///
+/// The result is that of `Linear::forward`, computed faster for large layers on burn's CPU backend.
 ///
 /// # Shapes
 ///
@@ -23,10 +25,10 @@ mod native {
     use crate::kernels::linear::{self, Sizes};
     use crate::operation::{Operation, apply};
 
-    /// Products of fewer multiplications are left to burn.
+    /// Products with fewer multiplications are left to burn.
     const LEAST: usize = 1 << 23;
 
-    /// `None` where the tensors are elsewhere, or small.
+    /// `None` unless the tensors are in f32 on burn's CPU backend and the product is large.
     pub(super) fn linear(layer: &Linear, x: &Tensor<3>) -> Option<Tensor<3>> {
         let weight = layer.weight.val();
         let ([batch, tokens, from], [channels, to]) = (x.dims(), weight.dims());
@@ -46,7 +48,7 @@ mod native {
         }
     }
 
-    /// Gradients to x and W, those that are wanted.
+    /// Gradients with respect to x and W, where wanted.
     fn gradients(
         [x, weight]: [&[f32]; 2],
         gradient: &[f32],
@@ -105,7 +107,7 @@ mod tests {
     use burn::nn::LinearConfig;
     use burn::tensor::{Device, Distribution};
 
-    /// Results and all gradients of a layer large enough for the kernels, with and without bias, beside burn's.
+    /// Results and gradients of a layer large enough for the kernels, with and without bias, against burn's.
     #[test]
     fn large_layers_are_those_of_burn() {
         let device = Device::flex().autodiff();
@@ -116,7 +118,7 @@ mod tests {
             let seen = |apply: &dyn Fn(Tensor<3>) -> Tensor<3>| -> Vec<Vec<f32>> {
                 let x = x.clone().require_grad();
                 let y = apply(x.clone());
-                // The gradient of the result is the result: unlike everywhere.
+                // This loss makes the result its own gradient, which differs everywhere.
                 let gradients = y.clone().square().sum().mul_scalar(0.5).backward();
                 let mut all = vec![
                     y.into_data(),
@@ -136,7 +138,7 @@ mod tests {
             for (ours, burns) in ours.iter().zip(&burns) {
                 assert_eq!(ours.len(), burns.len());
                 let largest = burns.iter().fold(0f32, |m, v| m.max(v.abs()));
-                // Sums of at most 512 terms in another order, one after the other.
+                // At most 512 terms are summed in another order.
                 let near = |(a, b): (&f32, &f32)| (a - b).abs() < 512.0 * 6e-8 * largest;
                 assert!(ours.iter().zip(burns).all(near), "{bias}");
             }

@@ -1,8 +1,8 @@
 //! Standard normal noise from a counter: the same numbers on every backend, in any order.
 //!
-//! A [`NoiseSource`] is a seed. A draw is named by a stream (which noise of the run it is) and the
-//! position in it, so image k of a batch gets the same noise alone or among others, and no draw
-//! depends on how many came before.
+//! A [`NoiseSource`] is a seed. A number is addressed by a stream (one for each use of noise in a run) and
+//! its position in the stream, so image k of a batch gets the same noise alone or in a batch, and no number
+//! depends on how many were drawn before.
 //!
 //! ```text
 //! words  = Philox4x32-10(counter = [position / 4, 0, stream, 0], key = [seed mod 2³², seed div 2³²])
@@ -10,7 +10,7 @@
 //! normal = √(−2 ln u₀) · (cos 2πu₁, sin 2πu₁),  √(−2 ln u₂) · (cos 2πu₃, sin 2πu₃)
 //! ```
 //!
-//! All in f64, rounded to f32 at the end.
+//! Everything is computed in f64 and rounded to f32 at the end.
 //!
 //! # References
 //!
@@ -21,19 +21,19 @@
 use burn::tensor::{Device, Tensor, TensorData};
 use rayon::prelude::*;
 
-/// Noise that follows from a seed.
+/// Source of noise that depends only on a seed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NoiseSource {
     seed: u64,
 }
 
 impl NoiseSource {
-    /// The noise of a seed.
+    /// Makes the source of a seed.
     pub fn new(seed: u64) -> Self {
         Self { seed }
     }
 
-    /// The first `length` numbers of a stream.
+    /// First `length` numbers of a stream of standard normal noise.
     pub fn normal(self, stream: u32, length: usize) -> Vec<f32> {
         let mut numbers = vec![0.0; length];
         self.fill(stream, &mut numbers);
@@ -93,16 +93,16 @@ pub fn normal_batch(
     Tensor::from_data(data, device)
 }
 
-/// Numbers that one core makes at a time.
+/// Numbers that one core generates at a time.
 const PART: usize = 1 << 14;
-/// Blocks of four numbers that are made side by side, for vector instructions.
+/// Blocks of four numbers that are generated side by side, for vector instructions.
 const LANES: usize = 16;
 
-/// A piece of a stream that is to be written.
+/// Piece of a stream to be written.
 struct Normals<'a> {
     key: [u32; 2],
     stream: u32,
-    /// The block that it begins with.
+    /// First block of the piece.
     first: u64,
     numbers: &'a mut [f32],
 }
@@ -159,12 +159,12 @@ fn normal4(words: [u32; 4]) -> [f32; 4] {
     [a, b, c, d]
 }
 
-// What follows is written without calls, branches and fused products, so that compilers turn it into vector instructions and
-// every machine gives the same bits.
+// The functions below are written without calls, branches and fused products, so that compilers turn them into vector
+// instructions and every machine gives the same bits.
 
 /// Cosine and sine of `turns` turns, 0 to 1, to within 2 units in the last place of 1.
 ///
-/// Quarters of a turn are taken out exactly; the series of what is left, at most π/4, end below 5e-17.
+/// Quarter turns are taken out exactly; the series of the remainder, at most π/4, end below 5e-17.
 #[inline(always)]
 fn cos_sin_turns(turns: f64) -> [f64; 2] {
     // Adding 1.5 · 2⁵² leaves the nearest whole number in the lowest bits.
@@ -192,7 +192,7 @@ fn cos_sin_turns(turns: f64) -> [f64; 2] {
     [cos, sin]
 }
 
-/// The natural logarithm of a normal number above 0, to within 3 units in the last place.
+/// Natural logarithm of a positive normal floating-point number, to within 3 units in the last place.
 ///
 /// ```text
 /// ln u = e ln 2 + 2 artanh f,   u = 2^e m,   f = (m − 1)/(m + 1),   √½ ≤ m < √2
@@ -202,7 +202,7 @@ fn cos_sin_turns(turns: f64) -> [f64; 2] {
 #[inline(always)]
 fn ln(u: f64) -> f64 {
     const FRACTION: u64 = (1 << 52) - 1;
-    // The exponent of m/√½ is that of the power of two to be taken out.
+    // The exponent of u/√½ is the power of two to be taken out.
     let bits = u.to_bits();
     let above = bits.wrapping_sub(std::f64::consts::FRAC_1_SQRT_2.to_bits());
     let e = (above as i64) >> 52;
@@ -271,11 +271,11 @@ mod tests {
         }
     }
 
-    /// Sums of series against the functions of the standard library, over their whole ranges.
+    /// The series against the functions of the standard library, over their whole ranges.
     #[test]
     fn logarithm_cosine_and_sine_are_right_to_few_units_in_the_last_place() {
         for k in 0..200_000u32 {
-            // From the smallest word to the largest, dense at both ends.
+            // Words from the smallest to the largest, dense at both ends.
             let word = match k % 4 {
                 0 => k,
                 1 => u32::MAX - k,
@@ -286,14 +286,14 @@ mod tests {
             assert!(error < 3.0 * f64::EPSILON, "ln {u}: {error:e}");
             let (sin, cos) = (std::f64::consts::TAU * u).sin_cos();
             let [c, s] = cos_sin_turns(u);
-            // The reference's angle is rounded: up to half a unit of 2π, 4.4e-16.
+            // The reference's angle is rounded by up to half a unit in the last place of 2π, 4.4e-16.
             for error in [(c - cos).abs(), (s - sin).abs()] {
                 assert!(error < 4.0 * f64::EPSILON, "{u}: {error:e}");
             }
         }
     }
 
-    /// Numbers of a stream are the formula's, one by one, to a unit in the last place of 32 bits.
+    /// Numbers of a stream follow the formula, to a unit in the last place of f32.
     #[test]
     fn numbers_are_those_of_the_formula() {
         let seed = 0x1234_5678_9ABC_DEF0_u64;

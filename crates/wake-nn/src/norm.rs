@@ -65,7 +65,7 @@ impl GroupNorm {
         self.normalize(x)
     }
 
-    /// Normalises an image and applies SiLU, the pair that stands before every convolution.
+    /// Normalises an image and applies SiLU, the pair that precedes every convolution.
     ///
     /// # Shapes
     ///
@@ -98,14 +98,14 @@ impl GroupNorm {
     }
 }
 
-/// The same in two passes over memory on burn's CPU backend.
+/// Normalisation by the crate's own kernels on burn's CPU backend.
 #[cfg(feature = "flex")]
 mod native {
     use super::*;
     use crate::kernels::group_norm::{self, Moments, Shape};
     use crate::operation::{Operation, apply};
 
-    /// `None` where the tensors are elsewhere.
+    /// `None` unless the tensors are in f32 on burn's CPU backend.
     pub(super) fn normalize(layer: &GroupNorm, x: &Tensor<4>, silu: bool) -> Option<Tensor<4>> {
         let [_, channels, rows, columns] = x.dims();
         let shape = Shape {

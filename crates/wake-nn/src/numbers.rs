@@ -1,15 +1,15 @@
-//! Kinds of numbers: casts, and whether sums are finite.
+//! Number types: casts, and checks that numbers are finite.
 
 use burn::tensor::{DType, FloatDType, Tensor};
 
 use crate::error::{Error, Result};
 
-/// Whether sums of squares can overflow or lose their digits in this kind of number.
+/// Whether a type has 16 bits, in which sums of squares can overflow or lose their digits.
 pub fn is_half(dtype: DType) -> bool {
     matches!(dtype, DType::F16 | DType::BF16)
 }
 
-/// The same tensor in another kind of number; nothing is done where it already is.
+/// Casts a tensor to another number type; a tensor that already has it is returned unchanged.
 pub fn cast_to<const D: usize>(tensor: Tensor<D>, dtype: DType) -> Tensor<D> {
     if tensor.dtype() == dtype {
         return tensor;
@@ -22,7 +22,7 @@ pub fn cast_to<const D: usize>(tensor: Tensor<D>, dtype: DType) -> Tensor<D> {
 ///
 /// # Errors
 ///
-/// [`Error::NotFinite`] when one is infinite or not a number.
+/// [`Error::NotFinite`] when the sum is infinite or NaN.
 pub fn check_finite<const D: usize>(what: &str, tensor: &Tensor<D>) -> Result<()> {
     let sum = cast_to(tensor.clone(), DType::F32)
         .sum()

@@ -1,27 +1,27 @@
-//! Operations of our own on burn's CPU backend, with gradients of their own.
+//! The crate's own operations on burn's CPU backend, with their gradients.
 
 use burn::backend::flex::FlexTensor;
 use burn::backend::{BackendTensor, DispatchAutodiffContext, DispatchTensor, DispatchTensorKind};
 use burn::tensor::{DType, Tensor, TensorData};
 
-/// What an operation computes from contiguous f32 tensors.
+/// Operation on contiguous f32 tensors.
 pub(super) trait Operation<const N: usize>:
     Clone + std::fmt::Debug + Send + 'static
 {
-    /// What the forward pass leaves for the gradients, beside its inputs.
+    /// Data that the forward pass saves for the gradients, in addition to its inputs.
     type Saved: Clone + std::fmt::Debug + Send + 'static;
 
-    /// The result, its shape, and what is saved.
+    /// Returns the result and the saved data.
     fn forward(&self, inputs: [&[f32]; N]) -> (Vec<f32>, Self::Saved);
 
-    /// Keeps the result where the gradients need it; it is shared, not copied.
+    /// Saves the result if the gradients need it; it is shared, not copied.
     #[cfg_attr(
         not(feature = "autodiff"),
         allow(dead_code, reason = "nothing is trained")
     )]
     fn keep(_: &mut Self::Saved, _: &FlexTensor) {}
 
-    /// The gradient to every input that is wanted, from the gradient of the result.
+    /// Returns the gradients with respect to the wanted inputs, from the gradient of the result.
     #[cfg_attr(
         not(feature = "autodiff"),
         allow(dead_code, reason = "nothing is trained")
@@ -35,7 +35,7 @@ pub(super) trait Operation<const N: usize>:
     ) -> [Vec<f32>; N];
 }
 
-/// Applies an operation; `None` where a tensor is not in f32 on burn's CPU backend.
+/// Applies an operation; `None` unless all tensors are in f32 on burn's CPU backend.
 pub(super) fn apply<const N: usize, const D: usize, O: Operation<N>>(
     operation: O,
     inputs: [DispatchTensor; N],
@@ -103,7 +103,7 @@ fn tensor(values: Vec<f32>, shape: &[usize]) -> FlexTensor {
     FlexTensor::from_data(TensorData::new(values, shape.to_vec()))
 }
 
-/// Operations that remember how they came about.
+/// Operations recorded for automatic differentiation.
 #[cfg(feature = "autodiff")]
 mod tracked {
     use burn::backend::autodiff::checkpoint::{base::Checkpointer, strategy::NoCheckpointing};
@@ -153,7 +153,7 @@ mod tracked {
         }
     }
 
-    /// The way back through an operation.
+    /// Backward pass of an operation.
     #[derive(Debug)]
     struct Step<O>(std::marker::PhantomData<O>);
 

@@ -54,14 +54,14 @@ pub fn depth_to_space(x: Tensor<4>, size: usize) -> Tensor<4> {
         .reshape([batch, channels, rows * size, columns * size])
 }
 
-/// The same without a walk over six dimensions on burn's CPU backend.
+/// The same on burn's CPU backend, without a tensor of six dimensions.
 #[cfg(feature = "flex")]
 mod native {
     use super::*;
     use crate::kernels::squares::Cut;
     use crate::operation::{Operation, apply};
 
-    /// `None` where the tensor is elsewhere.
+    /// `None` unless the tensor is in f32 on burn's CPU backend.
     pub(super) fn cut(
         x: &Tensor<4>,
         size: usize,
@@ -132,7 +132,7 @@ mod tests {
             .assert_eq(&x.into_data(), true);
     }
 
-    /// Several planes, sides that differ, squares of three: each pixel where the formula says.
+    /// Several planes, unequal sides, squares of three: each pixel lands where the formula says.
     #[test]
     fn every_pixel_goes_where_the_formula_says() {
         let (batch, channels, rows, columns, s) = (2, 3, 4, 5, 3);
@@ -156,7 +156,7 @@ mod tests {
             .assert_eq(&x.into_data(), true);
     }
 
-    /// Gradients come back to the pixels that they belong to.
+    /// Gradients return to the pixels that they belong to.
     #[test]
     #[cfg(feature = "autodiff")]
     fn gradients_are_put_back() {
@@ -176,7 +176,7 @@ mod tests {
             let y = change(x.clone());
             let weights = numbers(100, y.dims());
             let gradients = (y * weights.clone()).sum().backward();
-            // The sum is Σ x w', with w' the weights put back.
+            // The sum is Σ x w', where w' are the weights put back.
             let expected = match back {
                 true => space_to_depth(weights, 2),
                 false => depth_to_space(weights, 2),

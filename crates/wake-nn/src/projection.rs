@@ -1,4 +1,4 @@
-//! The maps between an image and a transformer's tokens.
+//! Maps between an image and a transformer's tokens.
 
 use burn::module::Module;
 use burn::nn::conv::Conv2d;
@@ -7,9 +7,9 @@ use burn::tensor::{Device, Tensor};
 
 use super::conv::conv1x1;
 
-/// A linear map of every pixel's channels, stored as a 1 × 1 convolution (Stable Diffusion v1) or
-/// as a matrix (v2). Both are computed as a matrix product that turns pixels into tokens or back on
-/// its way, so that nothing is transposed in memory.
+/// Linear map of every pixel's channels, stored as a 1 × 1 convolution (Stable Diffusion v1) or as a matrix (v2).
+///
+/// Both are computed as a matrix product that also turns pixels into tokens or back, so nothing is transposed in memory.
 #[derive(Module, Debug)]
 pub(super) enum Projection {
     Conv(Conv2d),
@@ -41,7 +41,7 @@ impl Projection {
         }
     }
 
-    /// `[batch, channels, pixels]` to `[batch, pixels, channels]`.
+    /// Maps pixels `[batch, channels, pixels]` to tokens `[batch, pixels, channels]`.
     pub(super) fn to_tokens(&self, pixels: Tensor<3>) -> Tensor<3> {
         let (matrix, bias) = self.matrix();
         let tokens = to_tokens(pixels, matrix.transpose());
@@ -51,7 +51,7 @@ impl Projection {
         }
     }
 
-    /// `[batch, pixels, channels]` to `[batch, channels, pixels]`.
+    /// Maps tokens `[batch, pixels, channels]` to pixels `[batch, channels, pixels]`.
     pub(super) fn to_pixels(&self, tokens: Tensor<3>) -> Tensor<3> {
         let (matrix, bias) = self.matrix();
         let pixels = to_pixels(tokens, matrix);
@@ -102,14 +102,14 @@ mod native {
         to: usize,
     }
 
-    /// `None` where the tensors are elsewhere.
+    /// `None` unless the tensors are in f32 on burn's CPU backend.
     pub(super) fn to_tokens(x: &Tensor<3>, matrix: &Tensor<2>) -> Option<Tensor<3>> {
         let ([batch, from, pixels], [_, to]) = (x.dims(), matrix.dims());
         let inputs = [x.clone().into_dispatch(), matrix.clone().into_dispatch()];
         apply(ToTokens { pixels, from, to }, inputs, [batch, pixels, to])
     }
 
-    /// `None` where the tensors are elsewhere.
+    /// `None` unless the tensors are in f32 on burn's CPU backend.
     pub(super) fn to_pixels(tokens: &Tensor<3>, matrix: &Tensor<2>) -> Option<Tensor<3>> {
         let ([batch, pixels, from], [to, _]) = (tokens.dims(), matrix.dims());
         let inputs = [
@@ -119,7 +119,7 @@ mod native {
         apply(ToPixels { pixels, from, to }, inputs, [batch, to, pixels])
     }
 
-    /// A product of each image, one after the other.
+    /// Computes the product of each image in turn and joins the results.
     fn each(x: &[f32], image: usize, product: impl Fn(&[f32]) -> Vec<f32>) -> Vec<f32> {
         let mut images = x.chunks_exact(image).map(product);
         let mut all = images.next().unwrap_or_default();
@@ -127,7 +127,7 @@ mod native {
         all
     }
 
-    /// The sum over all images of a product of two.
+    /// Sum of the products of all images.
     fn sum<'a>(
         pairs: impl Iterator<Item = (&'a [f32], &'a [f32])>,
         product: impl Fn(&[f32], &[f32]) -> Vec<f32>,
@@ -141,7 +141,7 @@ mod native {
     }
 
     impl ToTokens {
-        /// The layer whose gradient to W is this product.
+        /// Sizes of the layer whose gradient with respect to W is this product.
         fn sizes(&self) -> Sizes {
             Sizes {
                 rows: self.from,
@@ -182,7 +182,7 @@ mod native {
     }
 
     impl ToPixels {
-        /// The layer whose gradient to x is this product.
+        /// Sizes of the layer whose gradient with respect to x is this product.
         fn sizes(&self) -> Sizes {
             Sizes {
                 rows: self.to,
@@ -229,7 +229,7 @@ mod tests {
     use super::*;
     use burn::tensor::{Device, Distribution};
 
-    /// Both maps with their gradients beside burn's, of several images.
+    /// Both maps and their gradients against burn's, for one image and for several.
     #[test]
     fn maps_are_those_of_burn() {
         let device = Device::flex().autodiff();
@@ -244,7 +244,7 @@ mod tests {
                     let [ours, burns] = ways.map(|way| -> [Vec<f32>; 3] {
                         let (x, matrix) = (x.clone().require_grad(), matrix.clone().require_grad());
                         let y = way(x.clone(), matrix.clone());
-                        // The gradient of the result is the result: unlike everywhere.
+                        // This loss makes the result its own gradient, which differs everywhere.
                         let gradients = y.clone().square().sum().mul_scalar(0.5).backward();
                         let dx = x.grad(&gradients).unwrap().into_data();
                         let dmatrix = matrix.grad(&gradients).unwrap().into_data();
@@ -253,7 +253,7 @@ mod tests {
                     for (ours, burns) in ours.iter().zip(&burns) {
                         assert_eq!(ours.len(), burns.len());
                         let largest = burns.iter().fold(0f32, |m, v| m.max(v.abs()));
-                        // Sums of at most 3 · 90 terms in another order, one after the other.
+                        // At most 3 · 90 terms are summed in another order.
                         let near = |(a, b): (&f32, &f32)| (a - b).abs() < 270.0 * 6e-8 * largest;
                         assert!(ours.iter().zip(burns).all(near), "{batch}");
                     }

@@ -16,12 +16,12 @@ pub struct Downsample {
 }
 
 impl Downsample {
-    /// The U-Net's: one zero around the image; n pixels become ⌈n/2⌉.
+    /// Downsampling of the U-Net: one zero around the image; n pixels become ⌈n/2⌉.
     pub fn padded(channels: usize, device: &Device) -> Self {
         Self::new(channels, PaddingConfig2d::Explicit(1, 1, 1, 1), device)
     }
 
-    /// The autoencoder's: one zero to the right and below; n pixels become ⌊n/2⌋.
+    /// Downsampling of the autoencoder: one zero to the right and below; n pixels become ⌊n/2⌋.
     pub fn padded_at_end(channels: usize, device: &Device) -> Self {
         Self::new(channels, PaddingConfig2d::Explicit(0, 0, 1, 1), device)
     }
@@ -69,7 +69,7 @@ impl Upsample {
     }
 }
 
-/// Resizes by taking the pixel ⌊i · old / new⌋.
+/// Resizes to the nearest pixel: output i is pixel ⌊i · old / new⌋.
 ///
 /// # Shapes
 ///

@@ -1,4 +1,4 @@
-//! The residual block of autoencoder and U-Net.
+//! Residual block of the autoencoder and the U-Net.
 
 use burn::module::Module;
 use burn::nn::conv::Conv2d;
@@ -11,9 +11,9 @@ use super::norm::GroupNorm;
 /// Widths and constants of a [`ResnetBlock`].
 #[derive(Debug, Clone, Copy)]
 pub struct ResnetShape {
-    /// Channels of the image that comes in.
+    /// Channels of the input image.
     pub channels_in: usize,
-    /// Channels of the image that goes out.
+    /// Channels of the output image.
     pub channels_out: usize,
     /// Channels of the time embedding; `None` in the autoencoder.
     pub time_channels: Option<usize>,
@@ -23,7 +23,7 @@ pub struct ResnetShape {
     pub epsilon: f64,
 }
 
-/// Two convolutions beside a shortcut.
+/// Residual block: two convolutions and a shortcut.
 ///
 /// ```text
 /// h = conv(silu(norm(x))) + W t

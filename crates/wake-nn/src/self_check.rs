@@ -1,7 +1,7 @@
-//! Comparison of a device with numbers of the reference backend, which lie in the crates.
+//! Comparison of a device's results with stored results of the reference backend.
 //!
-//! Drivers and kernels with faults exist: black images and silent garbage have been reported for GPUs. Weights and inputs follow
-//! from counters, so that they are the same on every device; results of the CPU backend `flex` were written by a test.
+//! Drivers and kernels can be faulty: black images and silent garbage have been reported for GPUs. Weights and inputs
+//! follow from counters, so they are the same on every device; the results of the CPU backend `flex` were written by a test.
 
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
@@ -14,18 +14,18 @@ use crate::error::{Error, Result};
 use crate::noise::NoiseSource;
 use crate::weights::files::WeightFiles;
 
-/// Allowed difference, relative to the largest value: what half-precision fragments in a GPU's matrix
-/// products explain, and faults do not.
+/// Allowed difference, relative to the largest value: enough for half-precision fragments in a GPU's
+/// matrix products, too little for faults.
 const ALLOWED: f64 = 1e-3;
-/// Numbers of a stage that are compared, at most.
+/// Largest number of values that are compared in a stage.
 const COMPARED: usize = 2048;
 
-/// Numbers of a device at one stage of a model.
+/// Results of a device at one stage of a model.
 #[derive(Debug, Clone)]
 pub struct Stage {
     /// Name of the stage, for the error.
     pub name: &'static str,
-    /// Every number, or at most 2,048 at equal distances.
+    /// All numbers, or at most 2,048 at equal distances.
     pub found: Vec<f32>,
 }
 
@@ -33,7 +33,7 @@ impl Stage {
     /// The result of a stage.
     pub fn new<const D: usize>(name: &'static str, found: Tensor<D>) -> Self {
         let found = found.into_data();
-        // An odd distance meets all columns of an image.
+        // An odd step reaches all columns of an image.
         let step = found.num_elements().div_ceil(COMPARED) | 1;
         Self {
             name,
@@ -42,7 +42,7 @@ impl Stage {
     }
 }
 
-/// The numbers of some stages as a file, which [`compare`] reads.
+/// Writes the numbers of some stages as a file, which [`compare`] reads.
 ///
 /// # Errors
 ///
@@ -67,7 +67,7 @@ pub fn file_of(stages: &[Stage]) -> Result<Vec<u8>> {
 
 /// Checks that every stage agrees within 1e-3 of its largest value with the reference.
 ///
-/// - `reference`: a file of [`file_of`], the content of which is part of the program
+/// - `reference`: a file made by [`file_of`], embedded in the program
 ///
 /// # Errors
 ///
@@ -87,8 +87,9 @@ pub fn compare(
     Ok(())
 }
 
-/// A module with weights that follow from a seed alone, the same on every device: of mean 0 and of a variance that
-/// keeps the size of what goes through; vectors, such as scales and shifts, around ½.
+/// Sets the weights of a module from a seed alone, the same on every device.
+///
+/// Matrices have mean 0 and a variance that preserves the size of activations; vectors, such as scales and shifts, are around ½.
 pub fn seeded<M: Module>(module: M, seed: u64) -> M {
     module.map(&mut Seeder {
         source: NoiseSource::new(seed),
@@ -122,11 +123,11 @@ impl ModuleMapper for Seeder {
     }
 }
 
-/// Checks a device that is no CPU, once a process; `checked` lists the devices that are good.
+/// Checks a device that is not a CPU, once per process; `checked` lists the devices that passed.
 ///
 /// # Errors
 ///
-/// As `check`; a device that failed is checked again the next time.
+/// The errors of `check`; a device that failed is checked again the next time.
 pub fn check_once<E>(
     checked: &Mutex<Vec<Device>>,
     device: &Device,
@@ -139,7 +140,7 @@ pub fn check_once<E>(
     once(checked, device, check)
 }
 
-/// Runs a check on a device unless the list has it, and puts it there if it is good.
+/// Runs a check on a device unless the list has it, and adds the device if it passes.
 fn once<E>(
     checked: &Mutex<Vec<Device>>,
     device: &Device,
@@ -153,8 +154,8 @@ fn once<E>(
     Ok(())
 }
 
-/// Writes the file of some stages anew where the environment has `DRAW`, for the tests of crates that have such a file; the next
-/// build compares with it.
+/// Rewrites the file of some stages if the environment variable `DRAW` is set, for the tests of crates that have such a
+/// file; the next build compares with it.
 ///
 /// # Panics
 ///
@@ -167,7 +168,7 @@ pub fn draw(path: &Path, stages: &[Stage]) {
     }
 }
 
-/// The error for numbers that differ by more than is allowed, or are none.
+/// Returns an error for numbers that differ by more than is allowed or are NaN.
 fn compare_numbers(
     device: &Device,
     stage: &'static str,
@@ -235,7 +236,7 @@ mod tests {
         }
     }
 
-    /// What is written is read again, and a stage that no file has is wrong.
+    /// Written numbers are read back, and a stage that is not in the file is an error.
     #[test]
     fn numbers_come_back_from_their_file() {
         let cpu = Device::flex();

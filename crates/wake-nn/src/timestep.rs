@@ -1,4 +1,4 @@
-//! How a diffusion step, or any vector of numbers, enters the U-Net.
+//! Embedding of a diffusion step, or of any vector of numbers, for the U-Net.
 
 use burn::module::Module;
 use burn::nn::{Linear, LinearConfig};
@@ -6,15 +6,15 @@ use burn::tensor::{Device, Tensor};
 
 use super::activation::silu;
 
-/// Waves of the step number, from period 2π down to 2π · 10⁴.
+/// Sinusoidal embedding of the step number, with periods from 2π to 2π · 10⁴.
 ///
 /// ```text
 /// ω_i = 10000^(−i / (n/2 − s)),   e(t) = [cos(t ω_0…), sin(t ω_0…)]
 /// ```
 ///
-/// - `channels` n; of an odd number the last is 0
-/// - `frequency_shift` s: 0 in Stable Diffusion
-/// - `cos_first`: else the sines come first
+/// - `channels`: n; if it is odd, the last channel is 0
+/// - `frequency_shift`: s, 0 in Stable Diffusion
+/// - `cos_first`: whether the cosines come before the sines
 ///
 /// The frequencies are rounded as torch rounds them, since t ω reaches 999.
 ///

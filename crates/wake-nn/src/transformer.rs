@@ -15,19 +15,19 @@ use super::projection::Projection;
 pub struct TransformerShape {
     /// Channels of the image.
     pub channels: usize,
-    /// Channels of the prompt's tokens; `None` for pixels that are mixed with each other alone.
+    /// Channels of the prompt's tokens; `None` for self-attention alone.
     pub context_channels: Option<usize>,
     /// Heads of both attentions.
     pub heads: usize,
-    /// Blocks in a row.
+    /// Number of blocks.
     pub layers: usize,
     /// Groups of the normalisation before the first block.
     pub groups: usize,
-    /// Whether the maps in and out are stored as matrices instead of 1 × 1 convolutions.
+    /// Whether the input and output maps are stored as matrices instead of 1 × 1 convolutions.
     pub linear_projection: bool,
 }
 
-/// Pixels as tokens: a normalisation, a map in, transformer blocks, a map out, and a shortcut.
+/// Transformer with pixels as tokens: a normalisation, an input map, blocks, an output map and a shortcut.
 ///
 /// # References
 ///
@@ -66,12 +66,12 @@ impl Transformer2d {
     /// # Shapes
     ///
     /// - `x`: `[batch, channels, rows, columns]`
-    /// - `context`: `[batch, tokens, context_channels]`, where the blocks attend to one
+    /// - `context`: `[batch, tokens, context_channels]`, if the blocks attend to one
     /// - result: as `x`
     ///
     /// # Panics
     ///
-    /// Without a context that the blocks attend to.
+    /// If the blocks attend to a context and none is given.
     pub fn forward(&self, x: Tensor<4>, context: Option<&Tensor<3>>) -> Tensor<4> {
         let [batch, channels, rows, columns] = x.dims();
         let pixels = self
@@ -89,7 +89,7 @@ impl Transformer2d {
     }
 }
 
-/// Self-attention, attention to the context where there is one, and a feed-forward layer, each added to its input.
+/// Self-attention, attention to a context if there is one, and a feed-forward layer, each added to its input.
 #[derive(Module, Debug)]
 pub struct TransformerBlock {
     norm1: LayerNorm,
@@ -129,12 +129,12 @@ impl TransformerBlock {
     /// # Shapes
     ///
     /// - `x`: `[batch, tokens, channels]`
-    /// - `context`: `[batch, tokens of the context, context_channels]`, where the block attends to one
+    /// - `context`: `[batch, tokens of the context, context_channels]`, if the block attends to one
     /// - result: as `x`
     ///
     /// # Panics
     ///
-    /// Without a context that the block attends to.
+    /// If the block attends to a context and none is given.
     pub fn forward(&self, x: Tensor<3>, context: Option<&Tensor<3>>) -> Tensor<3> {
         let x = self.attn1.forward(layer_norm(&self.norm1, x.clone()), None) + x;
         let x = match (&self.norm2, &self.attn2, context) {

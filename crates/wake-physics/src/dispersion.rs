@@ -78,7 +78,7 @@ mod tests {
         let (k, h) = (1e-3, 2.0);
         assert!((phase_speed(k, h) / (GRAVITY * h).sqrt() - 1.0).abs() < 1e-5);
         assert!((group_speed(k, h) / phase_speed(k, h) - 1.0).abs() < 1e-5);
-        // Deep gravity waves: the group has half the speed; large k h neither overflows nor yields NaN.
+        // Deep gravity waves have half the phase speed as group speed; large k h neither overflows nor yields NaN.
         for depth in [1e6, f64::INFINITY] {
             assert!((group_speed(0.1, depth) / phase_speed(0.1, depth) - 0.5).abs() < 1e-3);
             assert_eq!(angular_frequency(0.0, depth), 0.0);

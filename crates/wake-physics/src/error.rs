@@ -1,8 +1,8 @@
-//! What can go wrong, by whose fault it is.
+//! Errors of this crate.
 
 use std::path::PathBuf;
 
-/// Why a scene could not be read or simulated.
+/// Error of reading or simulating a scene.
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the message names every field")]
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -30,7 +30,7 @@ pub enum Error {
         value: String,
         requirement: String,
     },
-    /// The text of a scene is not what a scene file holds.
+    /// The text is not a valid scene file.
     #[error("cannot read the scene: {message}")]
     Parse { message: String },
     /// An assignment `key=value` does not name a parameter or has no value.
@@ -55,7 +55,7 @@ pub enum Error {
         margin: [usize; 2],
         needed_gib: f64,
         available_gib: f64,
-        /// What to change, beginning with a verb.
+        /// Advice on what to change, beginning with a verb.
         advice: &'static str,
     },
 }
@@ -73,11 +73,11 @@ impl From<whole_files::Error> for Error {
 /// Result of this crate's fallible functions.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// Checks that `value` lies in the closed range `[min, max]`; NaN does not.
+/// Checks that `value` lies in the closed range `[min, max]`; NaN is rejected.
 ///
 /// # Errors
 ///
-/// [`Error::OutOfRange`] with the name, the value and the range.
+/// [`Error::OutOfRange`] with the name, the value and the range if it does not.
 pub(crate) fn in_range(
     name: &str,
     value: f64,
@@ -101,7 +101,7 @@ pub(crate) fn in_range(
 ///
 /// # Errors
 ///
-/// [`Error::NotFinite`] with the name and the value.
+/// [`Error::NotFinite`] with the name and the value if it is not.
 pub(crate) fn finite(name: &str, value: f64, unit: &'static str) -> Result<()> {
     if value.is_finite() {
         return Ok(());

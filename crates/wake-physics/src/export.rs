@@ -1,4 +1,4 @@
-//! Fields for other tools: `NumPy` arrays, TIFF with the size of the pixels, images and arrays of other crates.
+//! Export of fields: `NumPy` arrays, TIFF with the pixel size, and images and arrays of other crates.
 //!
 //! With the feature `png`:
 //!
@@ -19,14 +19,14 @@ use image::{ImageBuffer, Luma};
 use std::path::Path;
 use whole_files::write_atomically;
 
-/// What the header of a `NumPy` file is aligned to \[bytes\].
+/// Alignment of the data after the header of a `NumPy` file \[bytes\].
 const NPY_ALIGNMENT: usize = 64;
 
-/// Writes a field as a `NumPy` array of `float32`, `[rows, columns]`: format 1.0, read by `numpy.load`.
+/// Writes a field as a `NumPy` array of `float32`, `[rows, columns]`, in format 1.0 (read by `numpy.load`).
 ///
 /// # Errors
 ///
-/// [`Error::File`](crate::Error::File).
+/// [`Error::File`](crate::Error::File) if the file cannot be written.
 pub fn write_npy(path: &Path, field: &Field) -> Result<()> {
     Ok(write_atomically(path, &npy(field))?)
 }
@@ -35,7 +35,7 @@ fn npy(field: &Field) -> Vec<u8> {
     let (rows, columns) = (field.rows, field.columns);
     let header =
         format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({rows}, {columns}), }}");
-    // Magic word, version and length take ten bytes, the line feed at the end one.
+    // Magic string, version and length take ten bytes, the final line feed one.
     let length = (10 + header.len() + 1).next_multiple_of(NPY_ALIGNMENT) - 10;
     let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
     bytes.extend((length as u16).to_le_bytes());
@@ -44,16 +44,16 @@ fn npy(field: &Field) -> Vec<u8> {
     bytes
 }
 
-/// Writes a field as a TIFF of 32-bit floats with the tags of GeoTIFF 1.1: size of the pixels and the place of the first, in
-/// metres of x and y, in a plane of no place on Earth.
+/// Writes a field as a TIFF of 32-bit floats with the tags of GeoTIFF 1.1: pixel size and position of the first pixel, in
+/// metres of x and y, in a plane without a location on Earth.
 ///
 /// # Errors
 ///
-/// [`Error::File`](crate::Error::File), also where the field has no pixel.
+/// [`Error::File`](crate::Error::File) if the file cannot be written or the field has no pixels.
 ///
 /// # Panics
 ///
-/// If field and raster are not of one size.
+/// If field and raster differ in size.
 #[cfg(feature = "tiff")]
 pub fn write_tiff(path: &Path, raster: &crate::Raster, field: &Field) -> Result<()> {
     assert!(
@@ -86,8 +86,8 @@ fn tiff_of(raster: &crate::Raster, field: &Field) -> tiff::TiffResult<Vec<u8>> {
     )?;
     let tie = [0.0, 0.0, 0.0, raster.x(0), raster.y(0), 0.0];
     tags.write_tag(Tag::ModelTiepointTag, &tie[..])?;
-    // Version 1, revision 1.1, four keys: model type 32767 (user-defined), raster type 2 (a pixel is a point, so that the
-    // tie lies on its centre), a citation of 24 characters, and linear unit 9001 (metre).
+    // Version 1, revision 1.1, four keys: model type 32767 (user-defined), raster type 2 (a pixel is a point, so the tie
+    // point is its centre), a citation of 24 characters, and linear unit 9001 (metre).
     let keys: [u16; 20] = [
         1, 1, 1, 4, 1024, 0, 1, 32767, 1025, 0, 1, 2, 1026, 34737, 24, 0, 3076, 0, 1, 9001,
     ];
@@ -99,7 +99,7 @@ fn tiff_of(raster: &crate::Raster, field: &Field) -> tiff::TiffResult<Vec<u8>> {
 
 /// # Panics
 ///
-/// If there are not rows × columns values.
+/// If the number of values is not rows × columns.
 #[cfg(feature = "png")]
 impl From<Field> for ImageBuffer<Luma<f32>, Vec<f32>> {
     fn from(field: Field) -> Self {
@@ -119,11 +119,11 @@ impl From<ImageBuffer<Luma<f32>, Vec<f32>>> for Field {
     }
 }
 
-/// `[rows, columns]`.
+/// Array of shape `[rows, columns]`.
 ///
 /// # Panics
 ///
-/// If there are not rows × columns values.
+/// If the number of values is not rows × columns.
 #[cfg(feature = "ndarray")]
 impl From<Field> for ndarray::Array2<f32> {
     fn from(field: Field) -> Self {
@@ -132,7 +132,7 @@ impl From<Field> for ndarray::Array2<f32> {
     }
 }
 
-/// `[rows, columns]`, however the array lies in memory.
+/// Field from an array `[rows, columns]` of any memory layout.
 #[cfg(feature = "ndarray")]
 impl From<ndarray::ArrayView2<'_, f32>> for Field {
     fn from(array: ndarray::ArrayView2<'_, f32>) -> Self {
@@ -157,7 +157,7 @@ mod tests {
         })
     }
 
-    /// By the description of the format: magic word, version, length of the header, the header, row after row.
+    /// Compares with the format's specification: magic string, version, header length, header, then the rows.
     #[test]
     fn a_numpy_file_is_as_the_format_says() {
         let bytes = npy(&field());
@@ -187,13 +187,13 @@ mod tests {
         let array = ndarray::Array2::from(field());
         assert_eq!((array.dim(), array[[2, 1]]), ((3, 5), field().at(2, 1)));
         assert_eq!(Field::from(array.view()), field());
-        // Turned around in memory, the same element in each place.
+        // A transposed view has the same elements at transposed positions.
         let turned = Field::from(array.t());
         assert_eq!((turned.rows, turned.columns), (5, 3));
         assert_eq!(turned.at(1, 2), field().at(2, 1));
     }
 
-    /// By the decoder of the same crate; its tags by their numbers in the standard.
+    /// Values are read back by the decoder of the same crate; tags are looked up by their numbers in the standard.
     #[cfg(feature = "tiff")]
     #[test]
     fn a_tiff_has_values_and_the_size_of_a_pixel() {

@@ -1,4 +1,4 @@
-//! The fields of a scene while it is drawn, and which of them its image needs.
+//! The fields of a scene during its computation, and which of them its image needs.
 
 use crate::raster::{Field, Raster};
 use crate::scene::Term;
@@ -6,7 +6,7 @@ use crate::waves::Quantity;
 use crate::workspace::Workspace;
 use rayon::prelude::*;
 
-/// The linear fields that are results.
+/// The linear fields among the results.
 const OUTPUTS: [Quantity; 6] = [
     Quantity::Elevation,
     Quantity::SlopeX,
@@ -16,16 +16,16 @@ const OUTPUTS: [Quantity; 6] = [
     Quantity::VelocityZ,
 ];
 
-/// Which fields a caller asks for.
+/// The results that a caller asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Wanted {
-    /// The image, and what it is made of.
+    /// The image and what it is computed from.
     Image,
     /// All results.
     Fields,
 }
 
-/// The linear fields to be computed: those that the image needs, and those that are wanted besides.
+/// The linear fields to compute: those that the image needs, and others that are wanted.
 pub(crate) fn quantities(uses: impl Fn(Term) -> bool, wanted: Wanted) -> [Vec<Quantity>; 2] {
     let mut image = vec![Quantity::SlopeX, Quantity::SlopeY];
     if uses(Term::VelocityBunching) {
@@ -40,7 +40,7 @@ pub(crate) fn quantities(uses: impl Fn(Term) -> bool, wanted: Wanted) -> [Vec<Qu
     image.extend(single.map(|(_, quantity)| *quantity));
     let mut rest = OUTPUTS.to_vec();
     rest.retain(|quantity| !image.contains(quantity));
-    // Two fields share a transform: where one would stand alone, one more costs nothing.
+    // Two fields share a transform: an odd number leaves room for one more at no cost.
     if image.len() % 2 == 1 && !rest.is_empty() {
         image.push(rest.remove(0));
     }
@@ -50,8 +50,8 @@ pub(crate) fn quantities(uses: impl Fn(Term) -> bool, wanted: Wanted) -> [Vec<Qu
     [image, rest]
 }
 
-/// Fields of a scene: of the surface on the computed pixels with their margin, or as an image; those that nobody asks for have
-/// no pixel.
+/// Fields of a scene: on the computed pixels with their margin, or cut to the image. Fields that are not asked for have no
+/// pixels.
 #[derive(Debug, Default)]
 pub(crate) struct Fields {
     /// ζ \[m\].
@@ -60,26 +60,26 @@ pub(crate) struct Fields {
     pub(crate) slope_x: Field,
     /// ∂ζ/∂y \[1\].
     pub(crate) slope_y: Field,
-    /// Of the water along x [m/s].
+    /// Velocity of the water along x [m/s].
     pub(crate) velocity_x: Field,
-    /// Of the water along y [m/s].
+    /// Velocity of the water along y [m/s].
     pub(crate) velocity_y: Field,
-    /// Of the water upward [m/s].
+    /// Upward velocity of the water [m/s].
     pub(crate) velocity_z: Field,
     /// Velocity toward the radar [m/s].
     pub(crate) radial_velocity: Field,
-    /// Cross-section per unit area.
+    /// Radar cross-section per unit area.
     pub(crate) sigma0: Field,
     /// Intensity of the image before speckle.
     pub(crate) intensity: Field,
     /// Acceleration toward the radar [m/s²].
     pub(crate) radial_acceleration: Field,
-    /// Hydrodynamic modulation of the Bragg waves \[1\]; once all waves are in, the factor on their return.
+    /// Hydrodynamic modulation of the Bragg waves \[1\]; after all waves are added, the factor on their return.
     pub(crate) modulation: Field,
 }
 
 impl Fields {
-    /// Fields that are results besides the image: the first of [`Self::each`].
+    /// Number of fields that are results besides the image: the first of [`Self::each`].
     pub(crate) const RESULTS: usize = 8;
 
     /// All fields.
@@ -113,14 +113,14 @@ impl Fields {
         }
     }
 
-    /// Puts the blocks of all fields back.
+    /// Returns the buffers of all fields to the workspace.
     pub(crate) fn give_back(mut self, memory: &mut Workspace) {
         for field in self.each() {
             memory.give(std::mem::take(field));
         }
     }
 
-    /// Computes the velocity toward the radar at the incidence θ \[rad\], where the velocities are asked for.
+    /// Computes the velocity toward the radar at the incidence θ \[rad\] if the velocities were computed.
     pub(crate) fn project(&mut self, memory: &mut Workspace, raster: &Raster, incidence: f64) {
         let [vx, vz] = [&self.velocity_x, &self.velocity_z];
         if vx.values.is_empty() {

@@ -1,4 +1,4 @@
-//! The mappings between backscatter and grey.
+//! Mappings between backscatter and grey.
 
 use serde::{Deserialize, Serialize};
 use std::f64::consts::LN_10;
@@ -6,17 +6,17 @@ use std::f64::consts::LN_10;
 use crate::error::{Error, Result};
 use crate::raster::Field;
 
-/// Grey between two fixed ends, the same for every scene: linear in decibel, or in amplitude as quick-looks are.
+/// Grey between two fixed ends, equal for all scenes: linear in decibel, or in amplitude as in quick-looks.
 ///
 /// ```text
 /// g = (10 log₁₀ σ⁰ − darkest)/(brightest − darkest),     cut to 0…1
 /// g = (√σ⁰ − √σ_d)/(√σ_b − √σ_d) with the ends as σ⁰,    in amplitude
 /// ```
 ///
-/// Brightness carries wind and incidence, so an image is never stretched to its own range. [`GreyScale::default`]
-/// is −30 to +10 dB, 0.16 dB a level of 8 bits: at X band, 16 to 32° and wind of 3 to 7 m/s, mean σ⁰ lies between
-/// about −23 dB (crosswind) and +4 dB, which leaves 6 dB and more for waves and most of the speckle. The echo of a
-/// ship is white. Stored with data sets and weights: an image without its scale has no unit.
+/// Brightness carries wind and incidence, so an image is never stretched to its own range. [`GreyScale::default`] is −30 to
+/// +10 dB, 0.16 dB per 8-bit level: at X band, 16 to 32° and winds of 3 to 7 m/s, mean σ⁰ lies between about −23 dB
+/// (crosswind) and +4 dB, which leaves at least 6 dB for waves and most of the speckle. Ship echoes are white. The scale is
+/// stored with data sets and weights: without it, an image has no unit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GreyScale {
@@ -61,10 +61,10 @@ impl Default for GreyScale {
 }
 
 impl GreyScale {
-    /// Grey in amplitude for a sea of a mean σ⁰: −60 dB is black and the mean lies at four tenths of the range, where one
-    /// pixel in two hundred of one look is cut (chosen).
+    /// Grey in amplitude for a sea of the given mean σ⁰: −60 dB is black, and the mean lies at four tenths of the range,
+    /// where one in two hundred single-look pixels is clipped (chosen).
     ///
-    /// - `mean_sigma0` \[1\], above 0; one value for all images that are compared
+    /// - `mean_sigma0` \[1\], above 0; use one value for all images to be compared
     #[must_use]
     pub fn amplitude_around(mean_sigma0: f64) -> Self {
         Self {
@@ -74,8 +74,8 @@ impl GreyScale {
         }
     }
 
-    /// Grey in amplitude that fills its range with one image: one pixel in a hundred lies below black, and one in two hundred
-    /// above white. For people, who compare nothing.
+    /// Grey in amplitude stretched to one image: one pixel in a hundred lies below black, and one in two hundred above
+    /// white. For viewing only: images are not comparable.
     ///
     /// - `field`: σ⁰ \[1\], at least one pixel
     #[must_use]
@@ -98,8 +98,8 @@ impl GreyScale {
     ///
     /// # Errors
     ///
-    /// [`Error::OutOfRange`] for an end beyond −200 to 100 dB, [`Error::Conflict`] for ends less than a thousandth of a
-    /// decibel apart or the wrong way round.
+    /// [`Error::OutOfRange`] for an end beyond −200 to 100 dB, [`Error::Conflict`] for ends in the wrong order or less than
+    /// a thousandth of a decibel apart.
     pub fn validate(&self) -> Result<()> {
         let ends = [
             ("grey.darkest_db", self.darkest_db),
@@ -140,7 +140,7 @@ impl GreyScale {
         ((value - dark) / (bright - dark)).clamp(0.0, 1.0)
     }
 
-    /// The ends in what grey is linear in.
+    /// The ends in the quantity in which grey is linear.
     fn ends(&self) -> [f64; 2] {
         let ends = [self.darkest_db, self.brightest_db];
         match self.mapping {
@@ -149,7 +149,7 @@ impl GreyScale {
         }
     }
 
-    /// σ⁰ \[1\] of grey: the inverse of [`Self::grey`] between its ends, and its continuation beyond them.
+    /// σ⁰ \[1\] of a grey value: the inverse of [`Self::grey`] between the ends, extrapolated beyond them.
     #[must_use]
     pub fn sigma0(&self, grey: f64) -> f64 {
         let [dark, bright] = self.ends();
@@ -160,7 +160,7 @@ impl GreyScale {
         }
     }
 
-    /// Change of grey by the relative change of σ⁰, dg/d ln σ⁰ \[1\], between the ends.
+    /// Derivative of grey by ln σ⁰, dg/d ln σ⁰ \[1\], between the ends.
     #[must_use]
     pub fn slope(&self, sigma0: f64) -> f64 {
         let by_value = match self.mapping {
@@ -171,13 +171,13 @@ impl GreyScale {
         by_value / (bright - dark)
     }
 
-    /// Grey as the nearest level of 8 bits.
+    /// Grey as the nearest 8-bit level.
     #[must_use]
     pub fn level(&self, sigma0: f64) -> u8 {
         (255.0 * self.grey(sigma0)).round() as u8
     }
 
-    /// σ⁰ \[1\] of a level of 8 bits.
+    /// σ⁰ \[1\] of an 8-bit level.
     #[must_use]
     pub fn sigma0_of_level(&self, level: u8) -> f64 {
         self.sigma0(f64::from(level) / 255.0)
@@ -188,7 +188,7 @@ impl GreyScale {
 mod tests {
     use super::*;
 
-    /// Of 201 values, the third lies one in a hundred from below, the second to last one in two hundred from above.
+    /// Of 201 values, the third is the first percentile and the second to last the 99.5th.
     #[test]
     fn one_image_fills_its_own_range() {
         let field = Field {
@@ -202,7 +202,7 @@ mod tests {
         assert_eq!((grey.level(3.0), grey.level(200.0)), (0, 255));
     }
 
-    /// Against differences of the mapping itself.
+    /// Compares with finite differences of the mapping.
     #[test]
     fn the_slope_is_that_of_the_grey() {
         for scale in [GreyScale::default(), GreyScale::amplitude_around(0.1)] {
@@ -210,7 +210,7 @@ mod tests {
                 let step = 1e-5;
                 let difference =
                     scale.grey(sigma0 * (1.0 + step)) - scale.grey(sigma0 * (1.0 - step));
-                // Central: an error of step²; rounding 1e-16/step.
+                // Central difference: error of order step²; rounding 1e-16/step.
                 assert!((scale.slope(sigma0) - 0.5 * difference / step).abs() < 1e-9);
             }
         }

@@ -1,23 +1,23 @@
-//! Gusts: a Gaussian field of wind speed over the scene, and what it does to σ⁰.
+//! Gusts: a Gaussian field of wind speed over the scene, and its effect on σ⁰.
 //!
 //! ```text
 //! g = ln(U₁₀/⟨U₁₀⟩),   Φ(κ) = s² κ₀^{2/3}/(3π) · a (κ_x'² a² + κ_y'² + κ₀²)^{−4/3},   ∬Φ = s²
 //! σ⁰ → σ⁰ exp(n g − ½ n² s²)
 //! ```
 //!
-//! with κ₀ = 2π/L₀ and gusts a times as long along the wind (x') as across. One-dimensional spectra fall as κ^{−5/3}, as
-//! Kolmogorov's. Scale, elongation and strength are chosen. The factor multiplies all of σ⁰; the waves of the sea stay.
+//! with κ₀ = 2π/L₀ and gusts a times as long along the wind (x') as across. One-dimensional spectra fall off as κ^{−5/3}
+//! (Kolmogorov). Scale, elongation and strength are chosen. The factor multiplies the whole σ⁰; the waves do not change.
 //!
-//! Eddies of the surface layer mottle the sea in patches of tens of metres. They are a second field of the same kind, isotropic,
-//! with one-dimensional spectra that fall as κ^{−2} and the correlation e^{−κ₀r}:
+//! Eddies of the surface layer mottle the sea in patches of tens of metres. They are a second field of the same kind,
+//! isotropic, with one-dimensional spectra that fall off as κ^{−2} and the correlation e^{−κ₀r}:
 //!
 //! ```text
 //! Φ(κ) = s² κ₀/(2π) · (κ² + κ₀²)^{−3/2}
 //! ```
 //!
-//! The wind 10 m above the sea varies most over wavelengths of 10 m/0.045 = 220 m, with a standard deviation of 2.5 u*, that is
-//! 0.08 to 0.1 of the mean (Kaimal et al. 1972, Q. J. R. Meteorol. Soc. 98; Panofsky and Dutton 1984, quoted from memory, not
-//! verified). The slope of −2 instead of −5/3 was measured in images of the sea, and is chosen.
+//! The wind 10 m above the sea varies most at wavelengths of 10 m/0.045 = 220 m, with a standard deviation of 2.5 u*, that
+//! is 0.08 to 0.1 of the mean (Kaimal et al. 1972, Q. J. R. Meteorol. Soc. 98; Panofsky and Dutton 1984, quoted from
+//! memory, not verified). The slope of −2 instead of −5/3 was measured in images of the sea and is chosen.
 
 use crate::fft::{fast_length, lattice_sum, signed_index};
 use crate::random::{Stream, generator};
@@ -27,13 +27,13 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
-/// How much longer gusts are along the wind than across: chosen from 1 to 2.
+/// Ratio of the length of gusts along the wind to that across: chosen from 1 to 2.
 const ELONGATION: f64 = 1.5;
 
-/// How much longer the eddies of the surface layer are along the wind than across: chosen.
+/// Ratio of the length of surface-layer eddies along the wind to that across: chosen.
 const MOTTLE_ELONGATION: f64 = 1.0;
 
-/// Period of the field over the extent of the raster: opposite edges are strangers.
+/// Period of the field relative to the raster: large enough that opposite edges are uncorrelated.
 const PERIOD: f64 = 1.25;
 
 /// Exponent n of σ⁰ ∝ `U₁₀`ⁿ.
@@ -50,7 +50,7 @@ pub fn wind_exponent(frequency: f64) -> f64 {
     }
 }
 
-/// Which of the two fields of wind.
+/// Kind of wind field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum GustKind {
@@ -83,8 +83,8 @@ impl GustKind {
         }
     }
 
-    /// Places over an outer scale at which the field is drawn: below them lies a twentieth of the variance of gusts and a fiftieth
-    /// of that of eddies.
+    /// Grid points per outer scale. A finer grid would resolve another twentieth of the variance of gusts and a fiftieth of
+    /// that of eddies.
     fn places(self) -> f64 {
         match self {
             Self::Gusts => 200.0,
@@ -93,7 +93,7 @@ impl GustKind {
     }
 }
 
-/// The gusts of a scene.
+/// Wind field of a scene: gusts or eddies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gusts {
     /// Gusts or eddies.
@@ -120,9 +120,9 @@ impl Gusts {
         norm * elongation * square.powf(-power)
     }
 
-    /// g at every pixel \[1\]: gusts shorter than a pixel are left out, those longer than the scene move all of it.
+    /// g at every pixel \[1\]. Gusts shorter than a pixel are left out; gusts longer than the scene shift it as a whole.
     ///
-    /// - `seed`: the same field whatever the number of threads
+    /// - `seed`: gives the same field for any number of threads
     #[must_use]
     pub fn field(&self, raster: &Raster, seed: u64) -> Field {
         let [rows, columns] =
@@ -138,7 +138,7 @@ impl Gusts {
                 let kx = signed_index(b, columns) as f64 * step[1];
                 for (a, value) in line.iter_mut().enumerate() {
                     let ky = signed_index(a, rows) as f64 * step[0];
-                    // The cell of the mean wind holds all that is longer than the scene.
+                    // The cell at wavenumber 0 holds all gusts longer than the scene.
                     let variance = if a == 0 && b == 0 {
                         self.in_cell(step)
                     } else {
@@ -146,7 +146,7 @@ impl Gusts {
                     };
                     let mut normal = || -> f32 { StandardNormal.sample(&mut random) };
                     let (re, im) = (normal(), normal());
-                    // The real part of both has the variance.
+                    // The real part of the sum then has this variance.
                     *value = Complex32::new(re, im) * variance.sqrt() as f32;
                 }
             });
@@ -159,7 +159,7 @@ impl Gusts {
         }
     }
 
-    /// g at every few pixels of a raster, and how many: 1/200 of the outer scale of gusts, 1/100 of that of eddies.
+    /// g at every few pixels of a raster, and the step: 1/200 of the outer scale for gusts, 1/100 for eddies.
     pub(crate) fn coarse_field(&self, raster: &Raster, seed: u64) -> (Field, usize) {
         let step = self.step(raster.spacing);
         let [rows, columns] = raster.every(step);
@@ -167,12 +167,12 @@ impl Gusts {
         (self.field(&coarse, seed), step)
     }
 
-    /// Pixels from one place at which g is drawn to the next.
+    /// Step in pixels between the points at which g is drawn.
     pub(crate) fn step(&self, spacing: f64) -> usize {
         ((self.scale / (self.kind.places() * spacing)) as usize).max(1)
     }
 
-    /// Multiplies σ⁰ with exp(n g − ½n²s²), g interpolated linearly; the rows are those from `first` on.
+    /// Multiplies σ⁰ by exp(n g − ½n²s²), with g interpolated linearly; the strip begins with row `first`.
     ///
     /// - `exponent` n, see [`wind_exponent`]
     pub(crate) fn modulate_strip(
@@ -231,11 +231,11 @@ mod tests {
                 TAU * k * mean
             });
         }
-        // Beyond k the share (κ₀/k)^{2/3} is left, times the mean of the stretch: at 160 rad/m below 1e-3.
+        // Beyond k, the share (κ₀/k)^{2/3} is left, times the mean of the stretch: below 1e-3 at 160 rad/m.
         assert!((sum / 0.0036 - 1.0).abs() < 2e-3, "{}", sum / 0.0036);
     }
 
-    /// Variance over many seeds is what the grid carries; correlation lengths follow the wind.
+    /// The variance over many seeds equals that of the grid; correlation lengths follow the wind.
     #[test]
     fn fields_have_the_variance_and_the_direction() {
         let gusts = Gusts {
@@ -257,7 +257,7 @@ mod tests {
             }
         }
         let n = f64::from(count as u32);
-        // What the lattice holds: its own sum of the density.
+        // Variance on the lattice: the sum of the density.
         let period = fast_length(150);
         let step = TAU / (period as f64 * 50.0);
         let mut held = gusts.in_cell([step, step]);
@@ -270,20 +270,21 @@ mod tests {
             }
         }
         assert!(held < 0.0036 && held > 0.0031, "{held}");
-        // Few gusts of 2 km in 6 km: some ten independent values a field, six hundred in all: four errors of √(2/600).
+        // Gusts of 2 km in 6 km: some ten independent values per field, six hundred in all; four standard errors of
+        // √(2/600).
         assert!(
             (variance / n / held - 1.0).abs() < 0.23,
             "{}",
             variance / n / held
         );
-        // Structure functions D ∝ r^{2/3}: along the wind r/a counts.
+        // Structure functions D ∝ r^{2/3}: along the wind, r/a counts.
         let ratio = along / across;
         let expected = ELONGATION.powf(-2.0 / 3.0);
         assert!((ratio / expected - 1.0).abs() < 0.12, "{ratio} {expected}");
     }
 
-    /// At the drawn places the factor is that of the field; between them that of the mean of its neighbours; its mean
-    /// over a normal g is 1.
+    /// On grid points the factor is that of the field, between them that of the mean of the neighbours; for normal g its
+    /// mean is 1.
     #[test]
     fn gusts_leave_the_mean_and_have_the_exponent() {
         let gusts = gusts();
@@ -312,8 +313,8 @@ mod tests {
         assert!((mean - 1.0).abs() < 1e-12);
     }
 
-    /// Eddies have the correlation e^{−κ₀r}: sums of the density against cosines, on a lattice fine and wide enough that what it
-    /// lacks, κ₀/κ of the variance beyond κ, is 1 %.
+    /// Eddies have the correlation e^{−κ₀r}, here sums of the density times cosines. The lattice is so fine and wide that
+    /// the missing variance beyond κ, κ₀/κ, is 1 %.
     #[test]
     fn eddies_have_an_exponential_correlation() {
         let eddies = Gusts {

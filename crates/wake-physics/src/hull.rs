@@ -20,9 +20,9 @@ pub struct Hull {
     length: f64,
     beam: f64,
     draft: f64,
-    /// Part m of the length that is parallel middle body.
+    /// Fraction m of the length that is parallel middle body.
     parallel: f64,
-    /// Part b of the draft above the turn of the bilge.
+    /// Fraction b of the draft above the turn of the bilge.
     flat: f64,
 }
 
@@ -48,14 +48,14 @@ impl Hull {
 
     /// A fuller hull of a given block coefficient.
     ///
-    /// The family is joined to one parameter by b = 1 − (1 − m)³ (chosen: at `C_B` = 0.8 half of the length is
-    /// parallel and the midship section has the coefficient 0.96, much like a tanker), so
+    /// The family is reduced to one parameter by b = 1 − (1 − m)³ (chosen: at `C_B` = 0.8 half of the length is parallel and the
+    /// midship section has the coefficient 0.96, much like a tanker), so
     ///
     /// ```text
     /// C_B = (2 + m)/3 · (2 + b)/3
     /// ```
     ///
-    /// - `block_coefficient` `C_B`, 4/9 to below 1; brought into that range
+    /// - `block_coefficient` `C_B`, 4/9 to below 1; clamped to that range
     ///
     /// # Validity
     ///
@@ -151,7 +151,7 @@ fn profile(s: f64, start: f64) -> (f64, f64) {
     (1.0 - t * t, -2.0 * t / (1.0 - start))
 }
 
-/// What the waves feel.
+/// Source of the waves.
 impl Hull {
     /// Michell's integral over the centre plane, in closed form.
     ///
@@ -159,8 +159,8 @@ impl Hull {
     /// F = ∬ (∂f/∂x) · V(z) · e^{iαx} dx dz,      V = cosh(k(h − z))/cosh(kh), in deep water e^{−kz}
     /// ```
     ///
-    /// The hull is symmetric fore and aft, so F is imaginary. Every part is a sum of positive terms or has a
-    /// series where its closed form cancels: it holds its digits for all arguments.
+    /// The hull is symmetric fore and aft, so F is imaginary. Every part is a sum of positive terms, or uses a series where its
+    /// closed form cancels, and so keeps its digits for all arguments.
     ///
     /// - `along` α, wavenumber along the track [rad/m]
     /// - `wavenumber` k [rad/m], at least 0
@@ -271,7 +271,7 @@ mod tests {
         ]
     }
 
-    /// Michell's integral by Gauss panels that follow the hull's corners: no closed form in it.
+    /// Michell's integral by Gauss panels that follow the hull's corners, without any closed form.
     fn numerical(hull: &Hull, along: f64, k: f64, depth: f64) -> Complex64 {
         let rule = GaussLegendre::new(40);
         let half = 0.5 * hull.length;
@@ -328,7 +328,7 @@ mod tests {
         }
     }
 
-    /// Small arguments against the leading term: F → −i α ∇-like moments, no cancellation down to 1e-12.
+    /// Small arguments agree with the leading term −iα∇/2, ∇ the volume, without cancellation down to 1e-12.
     #[test]
     fn small_arguments_keep_their_digits() {
         let hull = Hull::wigley(195.0, 26.0, 10.0);

@@ -1,7 +1,7 @@
 //! Physics-based simulation of ship wakes in synthetic aperture radar (SAR) images.
 //!
-//! A [`Scene`] (ship, sea, radar, grid) becomes a SAR image with every intermediate field, labels, and a plan that
-//! says what was computed and estimates what was not:
+//! A [`Scene`] (ship, sea, radar, grid) becomes a SAR image with every intermediate field, labels, and a plan that states
+//! which terms were computed and estimates those left out:
 //!
 //! ```
 //! use wake_physics::{Scene, simulate};
@@ -14,9 +14,9 @@
 //! # Ok::<(), wake_physics::Error>(())
 //! ```
 //!
-//! Every wave is a plane wave of linear theory: a random sea drawn from a wind spectrum, and the free waves of a thin
-//! ship. Facets of the surface scatter by Bragg, two-scale and specular theory; the radar displaces and smears what moves.
-//! Many scenes are drawn by a [`Simulator`]; [`measure`] reads an image back. Data flows one way:
+//! Every wave is a plane wave of linear theory: a random sea drawn from a wind spectrum, and the free waves of a thin ship.
+//! Surface facets scatter by Bragg, two-scale and specular theory; the radar displaces and smears moving facets. Use a
+//! [`Simulator`] for many scenes; [`measure`] analyses an image. Data flows one way:
 //!
 //! ```text
 //! Scene ─► sea surface + Kelvin wake (+ turbulent wake) ─► slopes, velocities ─► σ⁰ ─► SAR image ─► labels
@@ -24,10 +24,10 @@
 //!
 //! # Modules, in the order of the data flow
 //!
-//! | of | modules |
+//! | subject | modules |
 //! | --- | --- |
-//! | all | [`constants`], [`output`], [`export`], [`dispersion`], [`window`] |
-//! | what is asked | [`scene`] |
+//! | general | [`constants`], [`output`], [`export`], [`dispersion`], [`window`] |
+//! | the scene | [`scene`] |
 //! | the sea | [`spectrum`], [`spreading`], [`waves`], [`wind_sea`], [`swell`], [`surface`] |
 //! | the ship | [`hull`], [`kelvin`], [`turbulent`] |
 //! | the radar | [`permittivity`], [`scattering`], [`sar`], [`gusts`], [`slicks`] |
@@ -37,18 +37,18 @@
 //! # Axes and units
 //!
 //! SI units. x is ground range, growing away from the radar; y is azimuth, along the flight; z is up. Directions are
-//! degrees clockwise from +y and say where a thing goes to. Row 0 has the largest y; the pixel
-//! `[rows/2, columns/2]` is the origin. Formulas are functions of plain `f64`; fields are `f32`.
+//! degrees clockwise from +y and say where a thing goes to. Row 0 has the largest y; the pixel `[rows/2, columns/2]` is the
+//! origin. Formulas are functions of plain `f64`; fields are `f32`.
 //!
 //! # Speed and error
 //!
-//! Every fast method has a slow oracle in this crate ([`Method::Direct`], at some pixels [`direct_intensity`]).
-//! [`scene::Model::tolerance`] bounds, for every field, the largest difference to it relative to the field's root mean
-//! square, and for the image before speckle the root mean square of the difference relative to the mean.
+//! Every fast method has a slow reference in this crate ([`Method::Direct`]; for single pixels [`direct_intensity`]).
+//! [`scene::Model::tolerance`] bounds the difference: for every field the largest difference relative to the field's root
+//! mean square, for the image before speckle the root mean square difference relative to the mean.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
-/// The examples of the README are tests of the documentation, too.
+/// The README's examples run as doc-tests, too.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

@@ -1,16 +1,16 @@
-//! Will the fields fit? Asked before anything is computed.
+//! Check that the fields of a scene fit in memory, before anything is computed.
 
 use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
 
-/// Checks that `needed` bytes for a grid are free; `advice` says what would need less.
+/// Checks that `needed` bytes for a grid are free; `advice` names what would need less.
 ///
-/// What is free is what the machine has left or, where less, what the limits of the control groups of this process
-/// leave (containers). A few megabytes are never asked for. Where the system does not tell (only Linux is asked) nothing is refused.
+/// Free memory is what the machine has available, limited by the control groups of this process (containers). Requests of a
+/// few megabytes are not checked. Nothing is refused where the system reports no figure (only Linux is supported).
 ///
 /// # Errors
 ///
-/// [`Error::TooLarge`] with what is needed and what is free.
+/// [`Error::TooLarge`] with the needed and the free memory.
 pub(crate) fn check(
     [rows, columns]: [usize; 2],
     margin: [usize; 2],
@@ -33,11 +33,11 @@ pub(crate) fn check(
     }
 }
 
-/// So few bytes are there wherever this runs \[bytes\]; to ask takes as long as a small image.
+/// Requests up to this size are not checked \[bytes\]: a check takes as long as a small image.
 const NEVER_ASKED: u64 = 32 << 20;
 const GIB: f64 = (1u64 << 30) as f64;
 
-/// Bytes of memory that this process can still have; `None` where the system does not tell.
+/// Bytes of memory available to this process; `None` if the system does not report it.
 pub fn available() -> Option<u64> {
     let machine = parse(&std::fs::read_to_string("/proc/meminfo").ok()?)?;
     let groups = std::fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
@@ -45,8 +45,7 @@ pub fn available() -> Option<u64> {
     Some(group.map_or(machine, |group| group.min(machine)))
 }
 
-/// The least memory that a control group of this process leaves, of the second version or the first; `None` without a
-/// limit.
+/// Least memory left by the control groups of this process, version 2 or 1; `None` without a limit.
 ///
 /// - `groups`: content of `/proc/self/cgroup`, lines `0::/PATH` or `N:memory:/PATH`
 /// - `root`: where the groups are mounted
@@ -54,14 +53,14 @@ fn limits(groups: &str, root: &Path) -> Option<u64> {
     let number =
         |path: PathBuf| -> Option<u64> { std::fs::read_to_string(path).ok()?.trim().parse().ok() };
     let left = |folder: &Path, limit: &str, used: &str, cache: &str| {
-        // "max" is no number: no limit.
+        // "max" does not parse as a number: no limit.
         let limit = number(folder.join(limit))?;
         let used = number(folder.join(used))?;
         let stat = std::fs::read_to_string(folder.join("memory.stat")).unwrap_or_default();
         let cached = stat
             .lines()
             .find_map(|line| line.strip_prefix(cache)?.trim().parse().ok());
-        // Files that were read stay in memory until it is needed.
+        // Cached files count as used but can be evicted.
         Some(limit.saturating_sub(used.saturating_sub(cached.unwrap_or(0))))
     };
     let mut least = None;
@@ -75,7 +74,7 @@ fn limits(groups: &str, root: &Path) -> Option<u64> {
             "memory" => root.join("memory"),
             _ => continue,
         };
-        // A container sees its own group as the root; a parent's limit holds below it, too.
+        // A container sees its own group as the root; limits of parent groups apply as well.
         let path = root.join(path.trim_start_matches('/'));
         for folder in path
             .ancestors()
@@ -92,7 +91,7 @@ fn limits(groups: &str, root: &Path) -> Option<u64> {
     least
 }
 
-/// The line `MemAvailable:  123 kB` of `/proc/meminfo`, in bytes.
+/// Parses the line `MemAvailable:  123 kB` of `/proc/meminfo`; returns bytes.
 fn parse(text: &str) -> Option<u64> {
     let line = text.lines().find(|l| l.starts_with("MemAvailable:"))?;
     let kib: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
@@ -111,7 +110,7 @@ mod tests {
         assert_eq!(parse("MemAvailable: lots"), None);
     }
 
-    /// Trees as the kernel shows them, of both versions.
+    /// Trees as the kernel presents them, of both versions.
     #[test]
     fn the_limit_of_a_container_is_read() {
         let tree = tempfile::tempdir().unwrap();
@@ -126,7 +125,7 @@ mod tests {
         put("a/b/memory.max", "max\n");
         put("a/b/memory.current", "50\n");
         assert_eq!(limits(groups, root), None);
-        // The parent has the limit; 30 of what it uses are files that can go.
+        // The parent has the limit; 30 of its used bytes are cached files.
         put("a/memory.max", "1000\n");
         put("a/memory.current", "130\n");
         put("a/memory.stat", "anon 70\ninactive_file 30\n");

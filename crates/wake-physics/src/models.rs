@@ -1,4 +1,4 @@
-//! The models of a scene: sea, wake, backscatter and radar, with the scene's numbers in the units of formulas.
+//! The models of a scene: sea, wake, backscatter and radar, with the scene's parameters in the units of the formulas.
 
 use crate::constants::SPEED_OF_LIGHT;
 use crate::hull::Hull;
@@ -19,16 +19,16 @@ use crate::window::Window;
 use num_complex::Complex64;
 use std::f64::consts::{PI, SQRT_2, TAU};
 
-/// Block coefficient of the full hull where the scene names none: a laden tanker.
+/// Block coefficient of the full hull if the scene gives none: a laden tanker.
 const TANKER_BLOCK_COEFFICIENT: f64 = 0.8;
 
-/// Farthest coordinate of a ship \[m\]: squares and areas of what lies farther overflow. No image is anywhere near.
+/// Largest coordinate of a ship \[m\]; larger ones overflow in squares and areas. No image reaches so far.
 const FARTHEST: f64 = 1e100;
 
 /// The models of a valid scene.
 #[derive(Debug, Clone)]
 pub(crate) struct Models {
-    /// Pixels of the image, and those that are computed.
+    /// Pixels of the image and computed pixels.
     pub(crate) pixels: Pixels,
     /// Impulse response in range and azimuth, if the scene asks for one.
     pub(crate) response: Option<ImpulseResponse>,
@@ -38,7 +38,7 @@ pub(crate) struct Models {
     pub(crate) range_to_velocity: f64,
     /// Radar wavelength \[m\].
     pub(crate) wavelength: f64,
-    /// From amplitudes of waves to fields.
+    /// Transfer from wave amplitudes to fields.
     pub(crate) transfer: Transfer,
     /// The resolved waves.
     pub(crate) sea: DirectionalSpectrum,
@@ -50,16 +50,16 @@ pub(crate) struct Models {
     pub(crate) azimuth_resolution: f64,
     /// The swell, if there is one.
     pub(crate) swell: Option<Swell>,
-    /// The Kelvin wakes, one a ship.
+    /// The Kelvin wakes, one per ship.
     pub(crate) wakes: Vec<KelvinWake>,
-    /// Sea below the pixels, as variances.
+    /// Variances of the waves shorter than a pixel.
     pub(crate) subpixel: SubpixelVariance,
 }
 
-/// Variances of the waves of the sea that count without a phase.
+/// Variances of the sea's waves that enter statistically, without phase.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SubpixelVariance {
-    /// Slopes of waves that pixels carry and that are averaged over nevertheless.
+    /// Slopes of resolved waves that are averaged over nevertheless.
     averaged_slopes: SlopeCovariance,
     /// Standard deviation of the line-of-sight velocity [m/s].
     pub(crate) velocity: f64,
@@ -70,7 +70,7 @@ impl Models {
         let sea = wind_sea(scene);
         let response = response(scene);
         let spectrum = DirectionalSpectrum::new(&sea);
-        // Whatever spectrum the resolved waves have, the short ones are Elfouhaily's.
+        // The short waves follow Elfouhaily's spectrum whatever spectrum the resolved waves have.
         let short_waves = Elfouhaily::new(scene.sea.wind_speed, scene.sea.fetch);
         let action_slope = action_slope(
             &short_waves,
@@ -129,15 +129,15 @@ impl Models {
         }
     }
 
-    /// Wavenumbers of the ships' waves that the pixels do not carry and that tilt shorter ones [rad/m].
+    /// Wavenumbers of ship waves that the pixels do not resolve but that tilt shorter waves [rad/m].
     pub(crate) fn subpixel_band(&self) -> [f64; 2] {
         let split = self.two_scale.split_wavenumber();
         [self.pixels.computed.nyquist_wavenumber(), split]
     }
 
-    /// Averages over resolved waves too, as if a pixel held them.
+    /// Also averages over resolved waves, as if they were shorter than a pixel.
     ///
-    /// - `slopes`: their covariance
+    /// - `slopes`: covariance of their slopes
     /// - `velocity`: standard deviation of their line-of-sight velocity [m/s]
     pub(crate) fn average_over(&mut self, slopes: &SlopeCovariance, velocity: f64) {
         let subpixel = &mut self.subpixel;
@@ -145,7 +145,7 @@ impl Models {
         subpixel.velocity = subpixel.velocity.hypot(velocity);
     }
 
-    /// σ⁰ of facets, with or without the average over subpixel slopes and the specular return.
+    /// σ⁰ of facets, with or without the tilt average over subpixel slopes and the specular return.
     pub(crate) fn backscatter(&self, tilt_average: bool, specular: bool) -> Backscatter {
         let subpixel = self.subpixel_slopes();
         let lobe = Specular::mirror_lobe(self.radar_wavenumber(), self.pixels.computed.spacing);
@@ -164,7 +164,8 @@ impl Models {
         }
     }
 
-    /// Slopes of the waves between the pixel's and the radar's split wavenumber, and of those that are averaged over.
+    /// Slopes of the waves between the pixel's and the radar's split wavenumber, and of resolved waves that are averaged
+    /// over.
     pub(crate) fn subpixel_slopes(&self) -> SlopeCovariance {
         let short = self
             .two_scale
@@ -172,7 +173,7 @@ impl Models {
         short.plus(&self.subpixel.averaged_slopes)
     }
 
-    /// Why there is no wake, if so.
+    /// Reason why there is no wake, if there is none.
     pub(crate) fn no_wake(&self) -> Option<&'static str> {
         match &self.wakes[..] {
             [] => Some("there is no ship"),
@@ -187,9 +188,9 @@ impl Models {
         self.two_scale.facet([0.0, 0.0]) <= 0.0
     }
 
-    /// Azimuth resolution of the sea in motion. Every look has the radar's resolution; looks only average speckle.
+    /// Azimuth resolution of the moving sea. Every look has the radar's resolution; looks only average speckle.
     ///
-    /// An impulse response has the nominal resolution: it is not applied twice.
+    /// An impulse response includes the nominal resolution, which is then not applied again.
     pub(crate) fn resolution(&self) -> AzimuthResolution {
         let resolution = AzimuthResolution::of_moving_sea(
             self.wavelength,
@@ -204,7 +205,7 @@ impl Models {
         }
     }
 
-    /// Azimuth resolution of a sea at rest, as far as no impulse response has it.
+    /// Azimuth resolution of a sea at rest; 0 if an impulse response includes it.
     pub(crate) fn resolution_at_rest(&self) -> AzimuthResolution {
         let nominal = match self.response {
             Some(_) => 0.0,
@@ -213,8 +214,8 @@ impl Models {
         AzimuthResolution::at_rest(nominal, 1)
     }
 
-    /// Acceleration that defocuses the image as much as a random velocity of 1 m/s smears it [1/s]: (π/2 T (R/V) a)² of the
-    /// squared resolution against `2π² (R/V)² σ_u²`.
+    /// Acceleration with the same defocus as the smear by a random velocity of 1 m/s [1/s]: (π/2 T (R/V) a)² of the squared
+    /// resolution equals `2π² (R/V)² σ_u²`.
     pub(crate) fn defocus_of_velocity(&self) -> f64 {
         let defocus = self.resolution().defocus;
         if defocus > 0.0 {
@@ -224,7 +225,7 @@ impl Models {
         }
     }
 
-    /// Wavenumber of the radar `k_e` [rad/m].
+    /// Radar wavenumber `k_e` [rad/m].
     fn radar_wavenumber(&self) -> f64 {
         TAU / self.wavelength
     }
@@ -265,7 +266,7 @@ fn wind_sea(scene: &Scene) -> WindSea {
     }
 }
 
-/// The scene's relaxation rate, or that of its Bragg waves in its wind.
+/// The scene's relaxation rate, by default that of the Bragg waves in the scene's wind.
 fn relaxation(scene: &Scene) -> f64 {
     let of_bragg_waves = || {
         let friction = friction_velocity(scene.sea.wind_speed, DragLaw::default());
@@ -274,16 +275,16 @@ fn relaxation(scene: &Scene) -> f64 {
     scene.radar.relaxation_rate.unwrap_or_else(of_bragg_waves)
 }
 
-/// Wavenumber of the waves that a calm facet scatters with [rad/m].
+/// Wavenumber of the waves that scatter from a calm facet [rad/m].
 fn bragg_wavenumber(radar: &Radar) -> f64 {
     let k_e = TAU * radar.frequency / SPEED_OF_LIGHT;
     bragg::wavenumber(k_e, radar.incidence.to_radians())
 }
 
-/// The response that a scene asks for, unless a list of terms leaves it out.
+/// The impulse response that a scene asks for, unless its list of terms excludes it.
 ///
-/// Rules never leave it out: without it the waves between the sources' spacing and the pixels', the sidelobes of a ship and
-/// the smear of all contrast are missing, which no tolerance covers.
+/// The plan never drops it: without it, the waves between the spacings of sources and pixels, a ship's sidelobes and the
+/// smear of all contrast are missing, which no tolerance covers.
 fn response(scene: &Scene) -> Option<ImpulseResponse> {
     let radar = &scene.radar;
     let resolution = radar

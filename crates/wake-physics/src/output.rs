@@ -1,4 +1,4 @@
-//! Files of a simulation, each written whole or not at all.
+//! Output files of a simulation, written atomically.
 
 use crate::error::{Error, Result};
 use crate::raster::Field;
@@ -14,7 +14,7 @@ use std::path::Path;
 use whole_files::write_atomically;
 use whole_files::write_with;
 
-/// Numbers that are turned into bytes at once.
+/// Numbers converted to bytes at once.
 const PIECE: usize = 1 << 16;
 
 fn file_error(action: &'static str, path: &Path, error: &dyn std::fmt::Display) -> Error {
@@ -33,11 +33,11 @@ fn file_error(action: &'static str, path: &Path, error: &dyn std::fmt::Display) 
 ///
 /// # Errors
 ///
-/// [`Error::File`].
+/// [`Error::File`] if the file cannot be written.
 ///
 /// # Panics
 ///
-/// If there are not rows × columns pixels.
+/// If the number of pixels is not rows × columns.
 #[cfg(feature = "png")]
 pub fn write_png(path: &Path, pixels: &[u8], rows: usize, columns: usize) -> Result<()> {
     Ok(write_atomically(
@@ -46,17 +46,17 @@ pub fn write_png(path: &Path, pixels: &[u8], rows: usize, columns: usize) -> Res
     )?)
 }
 
-/// The bytes of an 8-bit grey PNG, as [`write_png`] writes them.
+/// Encodes an 8-bit grey PNG as [`write_png`] does.
 ///
-/// - `path`: named in the error
+/// - `path`: used in the error message
 ///
 /// # Errors
 ///
-/// [`Error::File`].
+/// [`Error::File`] if the encoding fails.
 ///
 /// # Panics
 ///
-/// If there are not rows × columns pixels.
+/// If the number of pixels is not rows × columns.
 #[cfg(feature = "png")]
 pub fn encode_png(path: &Path, pixels: &[u8], rows: usize, columns: usize) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
@@ -66,12 +66,12 @@ pub fn encode_png(path: &Path, pixels: &[u8], rows: usize, columns: usize) -> Re
     Ok(bytes)
 }
 
-/// Writes fields as `f32` tensors `[rows, columns]` of a safetensors file, and a complex image as `[rows, columns, 2]`, row by
-/// row: large fields are not copied as a whole.
+/// Writes fields as `f32` tensors `[rows, columns]` of a safetensors file, and a complex image as `[rows, columns, 2]`, row
+/// by row, without copying whole fields.
 ///
 /// # Errors
 ///
-/// [`Error::File`].
+/// [`Error::File`] if the file cannot be written.
 pub fn write_fields(
     path: &Path,
     fields: &[(&str, &Field)],
@@ -100,7 +100,7 @@ pub fn write_fields(
         start = end;
     }
     let mut header = serde_json::to_vec(&header).map_err(|e| file_error("encode", path, &e))?;
-    // The data begin at a multiple of eight.
+    // The data begin at a multiple of eight bytes.
     header.resize(header.len().next_multiple_of(8), b' ');
     let write = |file: &mut BufWriter<File>| {
         file.write_all(&(header.len() as u64).to_le_bytes())?;
@@ -110,7 +110,7 @@ pub fn write_fields(
     write_with(path, write).map_err(|e| file_error("write", path, &e))
 }
 
-/// What the header of a safetensors file says of a tensor.
+/// Header entry of a tensor in a safetensors file.
 #[derive(Serialize)]
 struct Place<'a> {
     dtype: &'static str,
@@ -125,7 +125,7 @@ struct Tensor<'a> {
     values: Values<'a>,
 }
 
-/// Its numbers.
+/// Values of a tensor.
 enum Values<'a> {
     Real(&'a [f32]),
     Complex(&'a [Complex32]),
@@ -172,7 +172,7 @@ mod tests {
         write_fields(&path, &[("elevation", &field)], Some((&slc, [2, 3]))).unwrap();
         let bytes = std::fs::read(&path).unwrap();
         let file = safetensors::SafeTensors::deserialize(&bytes).unwrap();
-        // As the library writes it itself, byte for byte.
+        // Byte for byte as written by the library itself.
         let views: Vec<_> = file.iter().collect();
         assert_eq!(safetensors::serialize(views, None).unwrap(), bytes);
         let tensor = file.tensor("elevation").unwrap();

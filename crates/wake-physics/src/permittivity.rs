@@ -34,7 +34,7 @@ pub fn sea_water(frequency: f64, temperature: f64, salinity: f64) -> Complex64 {
     relaxation(e0 - e1, f1) + relaxation(e1 - e2, f2) + Complex64::new(e2, loss)
 }
 
-/// The two relaxations: permittivities before, between and after them, and their frequencies \[GHz\].
+/// The two relaxations: permittivities below, between and above them, and their frequencies \[GHz\].
 struct DoubleDebye {
     levels: [f64; 3],
     relaxation: [f64; 2],
@@ -73,7 +73,7 @@ impl DoubleDebye {
     }
 }
 
-/// Relative shift of the first relaxation per psu: a quartic to 30 °C, its tangent above.
+/// Relative shift of the first relaxation per psu: a quartic up to 30 °C, its tangent above.
 fn salt_shift(t: f64) -> f64 {
     if t > 30.0 {
         return 9.1873715e-4 + 1.5012396e-4 * (t - 30.0);
@@ -108,7 +108,7 @@ fn ratio_at_15_degrees(s: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Values of our own second implementation, `tests/reference/sea_and_scattering.py`; five digits.
+    /// Values from the independent implementation `tests/reference/sea_and_scattering.py`, to five digits.
     #[test]
     fn permittivity_meets_the_reference() {
         for (frequency, re, im) in [
@@ -121,7 +121,7 @@ mod tests {
         }
     }
 
-    /// Klein and Swift (1977) and Stogryn et al. (1995), independent fits, within 2 % (they differ by 1.6 %).
+    /// Klein and Swift (1977) and Stogryn et al. (1995), independent fits, agree within 2 % (they differ by 1.6 %).
     #[test]
     fn other_models_agree() {
         for (frequency, other) in [
@@ -144,8 +144,7 @@ mod tests {
         assert_eq!(conductivity(10.0, 0.0), 0.0);
     }
 
-    /// The continuation above 30 °C has the value and the slope of the quartic there, to the five digits of its
-    /// coefficients.
+    /// The continuation above 30 °C matches the quartic's value and slope there, to the five digits of its coefficients.
     #[test]
     fn warm_water_continues_smoothly() {
         let (at, d) = (30.0, 1e-6);
@@ -156,7 +155,7 @@ mod tests {
         assert!((continued / slope - 1.0).abs() < 1e-3);
     }
 
-    /// The whole range of scenes: a passive, lossy dielectric.
+    /// Over the whole range of scenes, water is a passive, lossy dielectric.
     #[test]
     fn every_scene_has_a_lossy_dielectric() {
         for frequency in [1e9, 5e9, 2e10] {

@@ -1,14 +1,15 @@
-//! The pixels that a scene is computed on: those of the image, or a whole number of finer ones along each side of a pixel.
+//! The pixels on which a scene is computed: those of the image, or an integer number of finer ones along each side of a
+//! pixel.
 //!
-//! Waves far shorter than a pixel are not seen as waves, but what they do to the mean brightness is: on pixels too coarse for
-//! the waves on the arms of a wake the arms vanish. So the spacing computed on is at most
+//! Waves far shorter than a pixel are not visible as waves, but their effect on the mean brightness is: on pixels too
+//! coarse for the waves on the arms of a wake, the arms vanish. The computed spacing is therefore at most
 //!
 //! ```text
 //! ρ/4 and 1/(2B)                            where the image has an impulse response
 //! λ_cusp/3.5,  λ_cusp = (2/3) 2πU²/g        where a ship's waves would be seen and the image's pixels do not carry them
 //! ```
 //!
-//! and an integer fraction of the image's. A pixel of the image is the mean over its square.
+//! and an integer fraction of the image's. Each image pixel is the mean over its square.
 
 use crate::kelvin::KelvinWake;
 use crate::raster::{Field, Raster};
@@ -17,15 +18,15 @@ use crate::scene::Grid;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
-/// Pixels a wave on the arms of a wake must have: chosen, as the brightness of arms no longer changes on finer ones.
+/// Pixels per wavelength on the arms of a wake: chosen, as the brightness of the arms no longer changes on finer pixels.
 const PIXELS_A_CUSP_WAVE: f64 = 3.5;
 
-/// A ship's waves are not seen where their slopes have a smaller variance: σ⁰ changes by below 1 % (two-scale theory, C
-/// band at 25°, where it changes most: 1.4 dB by 0.005).
+/// Smallest slope variance at which a ship's waves are visible: below it, σ⁰ changes by less than 1 % (two-scale theory, C
+/// band at 25°, where it changes most: 1.4 dB per 0.005).
 const VISIBLE: f64 = 1e-4;
 
-/// For the sake of a ship's waves a pixel is divided by at most this along each side, and as long as no more pixels than
-/// these are computed: about a second on two cores (both chosen).
+/// Limits of the refinement for a ship's waves: divisions along each side of a pixel, and computed pixels, about a second
+/// on two cores (both chosen).
 const MOST_DIVISIONS: usize = 4;
 const MOST_PIXELS: usize = 1 << 22;
 
@@ -34,14 +35,14 @@ const MOST_PIXELS: usize = 1 << 22;
 pub(crate) struct Pixels {
     /// Pixels of the image.
     pub(crate) image: Raster,
-    /// Pixels that are computed, without the margin: those of the image or finer ones, and the guard of an impulse response.
+    /// Computed pixels without the margin: those of the image or finer ones, with the guard of an impulse response.
     pub(crate) computed: Raster,
-    /// Spacing that the waves of a ship ask for \[m\], where what is computed is coarser.
+    /// Spacing that a ship's waves require \[m\], if the computed one is coarser.
     pub(crate) asked_spacing: Option<f64>,
 }
 
 impl Pixels {
-    /// Chooses what is computed for the image of a grid.
+    /// Chooses the computed pixels for the image of a grid.
     pub(crate) fn new(
         grid: &Grid,
         response: Option<&ImpulseResponse>,
@@ -73,14 +74,14 @@ impl Pixels {
         }
     }
 
-    /// Whether what is computed are not the pixels of the image.
+    /// Whether the computed pixels differ from those of the image.
     pub(crate) fn are_refined(&self) -> bool {
         self.computed != self.image
     }
 }
 
-/// Whether waves of a ship that the image's pixels do not carry, but pixels of a spacing \[m\] would, are seen half-way to
-/// the farthest corner of the image astern.
+/// Whether a ship's waves that pixels of `spacing` \[m\] resolve, but the image's do not, are visible half-way to the
+/// farthest corner of the image astern.
 fn visible(wake: &KelvinWake, image: &Raster, spacing: f64) -> bool {
     if spacing >= image.spacing {
         return false;
@@ -95,20 +96,22 @@ fn visible(wake: &KelvinWake, image: &Raster, spacing: f64) -> bool {
     astern > 0.0 && waves.is_some_and(|waves| waves.steepest(0.5 * astern) >= VISIBLE)
 }
 
-/// The computed pixels of each pixel of an image, and their weights: one that lies on the edge of two counts half for each.
+/// The computed pixels of each image pixel, and their weights: one on the edge between two pixels counts half for each.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Parts {
-    /// First computed row and column of the image's first pixel.
+    /// Computed row and column where the image's first pixel begins.
     first: [usize; 2],
     step: usize,
-    /// Weights along a side of a pixel, with sum 1.
+    /// Weights along the side of a pixel, with sum 1.
     side: Vec<f32>,
 }
 
 impl Parts {
+    /// Relates computed pixels to those of the image.
+    ///
     /// # Panics
     ///
-    /// If a pixel of the image reaches beyond the computed ones.
+    /// If an image pixel reaches beyond the computed ones.
     pub(crate) fn new(computed: &Raster, image: &Raster) -> Self {
         let step = (image.spacing / computed.spacing).round() as i64;
         let half = step / 2;
@@ -129,26 +132,26 @@ impl Parts {
         }
     }
 
-    /// The computed rows of some rows of the image.
+    /// The computed rows for some rows of the image.
     pub(crate) fn rows(&self, rows: &std::ops::Range<usize>) -> std::ops::Range<usize> {
         let start = self.first[0] + rows.start * self.step;
         let last = self.first[0] + rows.end.max(1) * self.step - self.step;
         start..(last + self.side.len()).max(start)
     }
 
-    /// Number of computed pixels of one.
+    /// Number of computed pixels per image pixel.
     pub(crate) fn count(&self) -> usize {
         self.side.len() * self.side.len()
     }
 
-    /// The computed pixels of one, row after row.
+    /// The computed pixels of one image pixel, row after row.
     pub(crate) fn of(&self, [i, j]: [usize; 2]) -> impl Iterator<Item = [usize; 2]> {
         let [row, column] = [self.first[0] + i * self.step, self.first[1] + j * self.step];
         let side = self.side.len();
         (0..side * side).map(move |n| [row + n / side, column + n % side])
     }
 
-    /// The mean over one pixel of values at its parts.
+    /// The mean over an image pixel of the values at its computed pixels.
     pub(crate) fn mean(&self, values: &[f64]) -> f64 {
         let rows = values.chunks(self.side.len()).zip(&self.side);
         let along = |row: &[f64]| -> f64 {
@@ -162,11 +165,11 @@ impl Parts {
     }
 }
 
-/// The means of a field on computed pixels over those of an image.
+/// Means of a field on computed pixels over the pixels of an image.
 ///
 /// # Panics
 ///
-/// If a pixel of the image reaches beyond the computed ones, or the field is not of their size.
+/// If an image pixel reaches beyond the computed ones, or the field does not match them in size.
 pub(crate) fn means_over(field: &Field, computed: &Raster, image: &Raster) -> Field {
     let size = [field.rows, field.columns];
     assert_eq!(
@@ -211,7 +214,7 @@ mod tests {
         (pixels, pixels.computed.spacing)
     }
 
-    /// `λ_cusp` = 2π 6.5²/(1.5 · 9.807) = 18.05 m asks for 5.16 m: the fraction of the image's spacing below it.
+    /// `λ_cusp` = 2π 6.5²/(1.5 · 9.807) = 18.05 m requires 5.16 m: the next smaller fraction of the image's spacing.
     #[test]
     fn the_waves_on_the_arms_have_their_pixels() {
         let slow = "ship.speed=6.5";
@@ -227,18 +230,18 @@ mod tests {
                 (computed(&[slow, &grid]).1 - expected).abs() < 1e-12,
                 "{spacing}"
             );
-            // No waves, no finer pixels: without a ship, at rest, and where the image lies ahead of the ship.
+            // No waves, no finer pixels: for a ship at rest and where the image lies ahead of the ship.
             for none in ["ship.speed=0", "ship.position=[0, 9000]"] {
                 let heading = "ship.heading=180";
                 assert!((computed(&[slow, heading, none, &grid]).1 - spacing).abs() < 1e-12);
             }
         }
-        // The waves of the default ship have 17 pixels as it is.
+        // The default ship's waves have 17 pixels already.
         let (pixels, _) = computed(&[]);
         assert!(!pixels.are_refined() && pixels.computed == pixels.image);
     }
 
-    /// Neither a slow ship nor a large image makes more pixels than the limits; what is asked for is known.
+    /// Neither a slow ship nor a large image exceeds the limits; the required spacing is recorded.
     #[test]
     fn the_limits_hold() {
         let (pixels, spacing) = computed(&["ship.speed=2", "grid.spacing=10"]);
@@ -262,15 +265,15 @@ mod tests {
         assert!((computed(&["grid.spacing=9", key]).1 - 3.0).abs() < 1e-12);
         let sentinel = "radar.sensor=sentinel-1-iw";
         assert!((computed(&[sentinel]).1 - 5.0).abs() < 1e-12);
-        // ρ = 20.3 m asks for 5.1 m, and twice its bandwidth for 9.7 m: one pixel of 20 m would not carry it.
+        // ρ = 20.3 m requires 5.1 m, and sampling at twice its bandwidth 9.7 m: pixels of 20 m are too coarse.
         assert!(
             (computed(&[sentinel, "grid.spacing=20", "grid.oversampling=1"]).1 - 20.0 / 3.0).abs()
                 < 1e-9
         );
     }
 
-    /// The weights are the shares of squares: a plane keeps its value in the middle of a pixel, and where the parts tile
-    /// the image each counts once in all.
+    /// The weights are shares of the square: a plane keeps its value at the centre of a pixel, and where the parts tile the
+    /// image, the weights of each add up to 1.
     #[test]
     fn means_are_over_the_square_of_a_pixel() {
         let image = Raster::image(5, 4, 12.0);

@@ -1,4 +1,4 @@
-//! A scene with everything that is built from it before a field is computed: built once a run.
+//! A scene with everything that is built from it before fields are computed; built once per run.
 
 use crate::effects::Effects;
 use crate::linear::OpenSea;
@@ -28,7 +28,7 @@ impl<'a> Prepared<'a> {
         }
     }
 
-    /// The mean over all seas of this scene: the models average over what its waves do.
+    /// The same scene for the mean over all seas: the models average over the effects of its waves.
     pub(crate) fn over_all_seas(self) -> Self {
         Self {
             models: self.open.averaged(&self.models),

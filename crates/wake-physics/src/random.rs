@@ -1,20 +1,20 @@
-//! Random numbers that do not depend on the number of threads: one generator per line of a grid, and one stream per use.
+//! Random numbers independent of the number of threads: one generator per line of a grid, and one stream per use.
 
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, SeedableRng};
 
-/// An odd constant that spreads line numbers over 64 bits, unlike the one that spreads the seed afterwards.
+/// Odd constant that spreads line numbers over 64 bits; different from the one that spreads the seed afterwards.
 const LINE_STEP: u64 = 0xD134_2543_DE82_EF95;
 
-/// What random numbers of one seed are drawn for. Every use has a stream of its own, here and nowhere else: lines of the
-/// same seed from its first line up to the first of the next.
+/// Uses of the random numbers of one seed. Every use has its own stream, defined only here: the lines of the seed from the
+/// stream's first line up to the first line of the next stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Stream {
     /// Amplitudes of the sea, by lines of its lattice.
     Sea,
     /// Phases of points, by looks.
     Points,
-    /// Places and strengths of the scatterers of ships, by ships.
+    /// Positions and strengths of the scatterers of ships, by ships.
     Scatterers,
     /// Paired echoes of the scatterers, by ships.
     PairedEchoes,
@@ -28,7 +28,7 @@ pub(crate) enum Stream {
     Swell,
     /// Reflectivity of the sea, by looks and rows.
     Reflectivity,
-    /// Speckle, by rows of the image; its lines are counted from the first number of the seed.
+    /// Speckle, by rows of the image; its lines are offset by the seed's first random number.
     Speckle,
 }
 
@@ -50,7 +50,7 @@ impl Stream {
 
 /// The generator of one line of a stream.
 ///
-/// Its numbers are fixed by `seed`, `stream` and `line` alone, on every platform: lines can be drawn in any order.
+/// The numbers depend only on `seed`, `stream` and `line`, on every platform, so lines can be drawn in any order.
 #[must_use]
 pub(crate) fn generator(seed: u64, stream: Stream, line: u64) -> Xoshiro256PlusPlus {
     let line = stream.first_line() + line;
@@ -81,7 +81,7 @@ mod tests {
         Stream::Speckle,
     ];
 
-    /// No line of any stream and seed begins as another does, and each begins the same again.
+    /// All lines of all streams and seeds begin differently, and each is reproducible.
     #[test]
     fn streams_lines_and_seeds_differ_and_repeat() {
         let mut seen = HashSet::new();
@@ -96,7 +96,7 @@ mod tests {
         }
     }
 
-    /// The streams have room: the longest, a thousand looks of 2²⁰ rows, ends before another begins.
+    /// The streams do not overlap: the longest, a thousand looks of 2²⁰ rows, ends before another begins.
     #[test]
     fn streams_of_lines_do_not_meet() {
         let longest = 1000u64 << 20;

@@ -1,12 +1,12 @@
-//! Pixels and their places: the raster every stage works on, and the fields that live on it.
+//! Pixels and their positions: the raster on which every stage works, and fields on it.
 
 use crate::numeric::vectorized;
 use rayon::prelude::*;
 
-/// Values that one task works on.
+/// Values per parallel task.
 const CHUNK: usize = 1 << 14;
 
-/// Partial sums kept side by side.
+/// Number of partial sums computed in parallel lanes.
 const LANES: usize = 8;
 
 /// A grid of square pixels over the sea.
@@ -44,7 +44,7 @@ impl Raster {
         }
     }
 
-    /// The same pixels with `rows` more above and below and `columns` more left and right.
+    /// The raster extended by `rows` above and below and `columns` left and right.
     #[must_use]
     pub fn with_margin(&self, rows: usize, columns: usize) -> Self {
         Self {
@@ -56,7 +56,7 @@ impl Raster {
         }
     }
 
-    /// Some of the rows.
+    /// The raster of the given rows.
     pub(crate) fn strip(&self, rows: &std::ops::Range<usize>) -> Self {
         Self {
             rows: rows.len(),
@@ -65,8 +65,8 @@ impl Raster {
         }
     }
 
-    /// Pixels of a `divisions`-th of the spacing over the squares of these: the middle of a pixel is the middle of one of
-    /// them, and where that leaves half a pixel at the edge it has a whole one.
+    /// Raster with `divisions` times finer pixels that covers these pixels. The centre of each pixel is the centre of a
+    /// finer one; where half a finer pixel would be left at the edge, there is a whole one.
     pub(crate) fn divided(&self, divisions: usize) -> Self {
         let half = divisions / 2;
         let size = |n: usize| n.saturating_sub(1) * divisions + 1 + 2 * half;
@@ -79,7 +79,7 @@ impl Raster {
         }
     }
 
-    /// Rows and columns of every `step`-th pixel from the first on, and one more to interpolate to.
+    /// Rows and columns of every `step`-th pixel from the first, plus one more for interpolation.
     pub(crate) fn every(&self, step: usize) -> [usize; 2] {
         [self.rows, self.columns].map(|n| n.div_ceil(step) + 1)
     }
@@ -108,7 +108,7 @@ impl Raster {
         (self.origin_row - row as i64) as f64 * self.spacing
     }
 
-    /// Pixel coordinates (column, row), with fractions, of the point (x, y) \[m\].
+    /// Fractional pixel coordinates (column, row) of the point (x, y) \[m\].
     #[must_use]
     pub fn pixel(&self, x: f64, y: f64) -> [f64; 2] {
         [
@@ -117,14 +117,14 @@ impl Raster {
         ]
     }
 
-    /// Largest wavenumber a pixel carries, π/spacing [rad/m]; "resolved" means |k| at most this.
+    /// Largest wavenumber that pixels resolve, π/spacing [rad/m]; "resolved" means |k| at most this.
     #[must_use]
     pub(crate) fn nyquist_wavenumber(&self) -> f64 {
         std::f64::consts::PI / self.spacing
     }
 }
 
-/// One value a pixel, row after row; by default there is no pixel.
+/// One value per pixel, row after row; empty by default.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Field {
     /// Number of rows.
@@ -154,7 +154,7 @@ impl Field {
         field
     }
 
-    /// Overwrites the values by a function of (row, column), row by row in parallel.
+    /// Overwrites the values with a function of (row, column), row by row in parallel.
     pub(crate) fn fill_from_fn(&mut self, value: impl Fn(usize, usize) -> f32 + Sync) {
         self.values
             .par_chunks_mut(self.columns.max(1))
@@ -176,12 +176,12 @@ impl Field {
         self.values[row * self.columns + column]
     }
 
-    /// Changes every pixel with a smooth field known at every `step`-th pixel of a raster of which these rows are a strip from
-    /// the row `first` on, interpolated linearly between them.
+    /// Changes every pixel using a smooth field that is given at every `step`-th pixel of a whole raster and interpolated
+    /// linearly; this field is the strip of that raster from row `first`.
     ///
     /// # Panics
     ///
-    /// If the field has fewer values than [`Raster::every`] pixels.
+    /// If the coarse field has fewer values than [`Raster::every`] pixels.
     pub(crate) fn change_with(
         &mut self,
         coarse: &Self,
@@ -214,7 +214,7 @@ impl Field {
     ///
     /// # Panics
     ///
-    /// If the fields are not of one size.
+    /// If the fields differ in size.
     pub(crate) fn add_product(&mut self, a: &Self, b: &Self) {
         assert!(
             a.values.len() == self.values.len() && b.values.len() == self.values.len(),
@@ -234,7 +234,7 @@ impl Field {
         });
     }
 
-    /// The middle of the field: without `rows` above and below and `columns` left and right.
+    /// The middle of the field, without `rows` above and below and `columns` left and right.
     ///
     /// # Panics
     ///
@@ -242,7 +242,7 @@ impl Field {
     #[must_use]
     pub fn crop(mut self, rows: usize, columns: usize) -> Self {
         let (height, width) = (self.rows - 2 * rows, self.columns - 2 * columns);
-        // In place: a row moves toward the start, never over one that is still to move.
+        // In place: rows move toward the start and never overwrite rows still to be moved.
         for i in 0..height {
             let start = (i + rows) * self.columns + columns;
             self.values.copy_within(start..start + width, i * width);
@@ -261,13 +261,13 @@ impl Field {
         self.sum_of(|v| v) / self.values.len().max(1) as f64
     }
 
-    /// Root of the mean square of the values.
+    /// Root mean square of the values.
     #[must_use]
     pub fn rms(&self) -> f64 {
         (self.sum_of(|v| v * v) / self.values.len().max(1) as f64).sqrt()
     }
 
-    /// Sum of a function of the values, in an order that does not depend on the number of threads.
+    /// Sum of a function of the values, in an order independent of the number of threads.
     fn sum_of(&self, term: impl Fn(f64) -> f64 + Sync) -> f64 {
         let of_chunk = |chunk: &[f32]| {
             vectorized(
@@ -289,7 +289,7 @@ impl Field {
         parts.iter().sum()
     }
 
-    /// Largest and root-mean-square absolute difference to another field.
+    /// Largest and root mean square absolute difference from another field.
     ///
     /// # Panics
     ///
@@ -316,7 +316,7 @@ impl Field {
 mod tests {
     use super::*;
 
-    /// A plane is interpolated to rounding.
+    /// A plane is interpolated exactly up to rounding.
     #[test]
     fn interpolation_is_exact_for_a_plane() {
         let r = Raster::image(13, 10, 1.0);

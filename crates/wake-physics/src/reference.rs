@@ -1,4 +1,4 @@
-//! Slow references, strong baselines and helpers of tests and benches; simulating a scene needs none of them.
+//! Slow references, strong baselines and helpers for tests and benches; simulations do not need them.
 //!
 //! | item | compares with |
 //! | --- | --- |
@@ -6,11 +6,11 @@
 //! | [`matrix_product`], [`synthesize`] | [`harmonic_sum`](crate::waves::harmonic_sum): the same sum as a matrix product, and by non-uniform FFTs |
 //! | [`DirectImage`] | the fast image of moving pixels |
 //! | [`cmod5n`] | σ⁰ of the open sea at C band by the empirical model CMOD5.N |
-//! | [`seams`] | images that are put together from squares |
-//! | [`paper_grid`] | the scenes of the paper this project starts from |
+//! | [`seams`] | images assembled from squares |
+//! | [`paper_grid`] | the scenes of the paper on which this project is based |
 //!
-//! Formulas of the field that no simulation calls: azimuth cutoff and coherence time of a moving sea, slant-range resolution of
-//! a bandwidth, conversions between spectra of wavenumber and frequency.
+//! Formulas of the field that no simulation uses: azimuth cutoff and coherence time of a moving sea, slant-range resolution
+//! for a bandwidth, conversions between wavenumber and frequency spectra.
 
 pub use crate::kelvin::quadrature::direct_quadrature;
 pub use crate::measure::seams::seams;

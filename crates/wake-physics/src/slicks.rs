@@ -1,11 +1,11 @@
-//! Slicks: winding bands of films that damp the short waves, as hard negatives beside wakes.
+//! Slicks: winding bands of surface films that damp the short waves, used as hard negatives beside wakes.
 //!
 //! ```text
 //! damping = D exp(−½ (d/(w/2))²),     d = |ψ|/|∇ψ|
 //! ```
 //!
-//! ψ is a random sum of plane waves of one length, the slicks lie along its zeros: lines that wind and close, at a mean
-//! distance of about half that length. A drawing of what images show; every constant is chosen.
+//! ψ is a random sum of plane waves of one length. Slicks lie along its zeros, lines that wind and close at a mean distance
+//! of about half that length. The model imitates the appearance in images; every constant is chosen.
 
 use crate::random::{Stream, generator};
 use crate::raster::{Field, Raster};
@@ -14,20 +14,20 @@ use rand::Rng;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// Wind speed from which films are torn apart [m/s]: chosen.
+/// Wind speed above which films are torn apart [m/s]: chosen.
 pub const STRONGEST_WIND: f64 = 6.0;
 
-/// Plane waves in ψ: enough that it is close to Gaussian.
+/// Number of plane waves in ψ, enough to make it nearly Gaussian.
 const WAVES: usize = 24;
 
 /// The slicks of a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Slicks {
-    /// Damping of the short waves in the middle, D \[1\], 0 to 1.
+    /// Damping of the short waves at the centre, D \[1\], 0 to 1.
     pub damping: f64,
     /// Full width w \[m\], above 0: twice the distance at which the damping has fallen to e^{−1/2}.
     pub width: f64,
-    /// Length over which they wind \[m\], above 0.
+    /// Length scale of the winding \[m\], above 0.
     pub scale: f64,
 }
 
@@ -35,12 +35,13 @@ pub struct Slicks {
 type Wave = ([f64; 2], Complex64);
 
 impl Slicks {
-    /// Remaining share of the short waves at every pixel, 1 − damping \[1\]; 1 everywhere in a wind above
+    /// Remaining share of the short waves at every pixel, 1 − damping \[1\]; 1 everywhere for winds above
     /// [`STRONGEST_WIND`].
     ///
-    /// Drawn at pixels up to a tenth of the width apart and interpolated linearly between them: in the mean within 0.005 of the damping.
+    /// Evaluated at pixels up to a tenth of the width apart and interpolated linearly, with a mean error within 0.005 of
+    /// the damping.
     ///
-    /// - `seed`: the same field whatever the number of threads
+    /// - `seed`: gives the same field for any number of threads
     #[must_use]
     pub fn field(&self, raster: &Raster, wind_speed: f64, seed: u64) -> Field {
         self.strip(raster, &(0..raster.rows), wind_speed, seed)
@@ -63,7 +64,7 @@ impl Slicks {
         let above = rows.start / step;
         let [below, columns] = raster.every(step);
         let below = below.min(rows.end.div_ceil(step) + 1);
-        // The turn of a wave at a place is that of its column times that of its row.
+        // The phasor of a wave at a pixel is the product of those of its column and row.
         let turns =
             |axis: usize, at: f64| waves.iter().map(move |(k, _)| Complex64::cis(k[axis] * at));
         let of_columns = (0..columns).flat_map(|j| turns(0, raster.x(step * j)));
@@ -94,9 +95,9 @@ impl Slicks {
     }
 }
 
-/// Distance from the nearest zero of ψ to first order, |ψ|/|∇ψ| \[m\].
+/// Distance to the nearest zero of ψ to first order, |ψ|/|∇ψ| \[m\].
 ///
-/// - `turns`: of every wave e^{i(kx x + ky y)} at the place, in the order of the waves
+/// - `turns`: e^{i(kx x + ky y)} of every wave at the position, in the order of the waves
 fn distance(waves: &[Wave], turns: impl Iterator<Item = Complex64>) -> f64 {
     let (mut value, mut slope) = (0.0, [0.0; 2]);
     for (([kx, ky], phase), turn) in waves.iter().zip(turns) {
@@ -118,13 +119,13 @@ mod tests {
         scale: 2500.0,
     };
 
-    /// The distance at a place.
+    /// The distance at a position.
     fn at(waves: &[Wave], [x, y]: [f64; 2]) -> f64 {
         let turn = |(k, _): &Wave| Complex64::cis(k[0] * x + k[1] * y);
         distance(waves, waves.iter().map(turn))
     }
 
-    /// One wave alone: parallel bands, where the distance is that of tan: d(1 + O((kd)²/3)).
+    /// One wave alone gives parallel bands, where the distance follows tan: d(1 + O((kd)²/3)).
     #[test]
     fn one_wave_makes_straight_bands() {
         let waves = [([0.002, 0.0], Complex64::cis(-TAU / 4.0))];
@@ -152,7 +153,7 @@ mod tests {
         }
         let length = area / f64::from(count as u32) / 50.0;
         let expected = TAU / 2500.0 / (2.0 * 2f64.sqrt());
-        // Some 2.6 periods squared a field, sixty fields: 7 % of scatter; the first-order distance adds (kd)²/3.
+        // About 2.6 periods squared per field, sixty fields: 7 % of scatter; the first-order distance adds (kd)²/3.
         assert!(
             (length / expected - 1.0).abs() < 0.2,
             "{}",
@@ -160,7 +161,8 @@ mod tests {
         );
     }
 
-    /// Drawn on every pixel and on every fourth: the curvature of the profile, 4D/w², over an eighth of the step's square.
+    /// Evaluated at every pixel and at every fourth: the curvature of the profile, 4D/w², over an eighth of the squared
+    /// step.
     #[test]
     fn interpolation_keeps_the_profile() {
         let fine = Raster::image(320, 360, 1.25);
@@ -178,7 +180,7 @@ mod tests {
                 square += (f64::from(field.at(i, j)) - exact).powi(2) / (320.0 * 360.0);
             }
         }
-        // In the mean: where slicks cross, ∇ψ vanishes and the profile bends more.
+        // A mean error: where slicks cross, ∇ψ vanishes and the profile has more curvature.
         let error = square.sqrt();
         assert!(error < 0.005 * 0.5 && error > 1e-5, "{error}");
     }

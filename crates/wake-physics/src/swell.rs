@@ -1,10 +1,10 @@
-//! Swell: old waves of one length and direction, on top of the wind sea.
+//! Swell: old waves of one length and direction, added to the wind sea.
 //!
 //! ```text
 //! Ψ(k, φ) = H²/16 · N(k; k_p, 0.1 k_p)/k · N(φ; φ_p, 12°),     ∬Ψ dkx dky = (H/4)²
 //! ```
 //!
-//! with N the Gaussian density. The widths are chosen; a swell's are narrower the farther it has come.
+//! with N the Gaussian density. The widths are chosen; a real swell is narrower the farther it has travelled.
 
 use crate::dispersion::angular_frequency;
 use crate::random::{Stream, generator};
@@ -13,16 +13,16 @@ use num_complex::Complex64;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use std::f64::consts::{PI, TAU};
 
-/// Width of the peak in wavenumber over its wavenumber: chosen.
+/// Spectral width in wavenumber, relative to the peak wavenumber: chosen.
 const RELATIVE_WIDTH: f64 = 0.1;
 
-/// Width in direction \[rad\], 12°: chosen.
+/// Spectral width in direction \[rad\], 12°: chosen.
 const SPREAD: f64 = 12.0 * PI / 180.0;
 
 /// Standard deviations at which the peak is cut off.
 const CUT: f64 = 5.0;
 
-/// Waves along the wavenumber and along the direction.
+/// Number of waves along wavenumber and along direction.
 const WAVES: usize = 32;
 
 /// A swell.
@@ -37,14 +37,14 @@ pub struct Swell {
 }
 
 impl Swell {
-    /// Variance spectrum Ψ \[m⁴\] at a wavenumber [rad/m]; 0 farther than five widths from the peak.
+    /// Variance spectrum Ψ \[m⁴\] at a wavenumber [rad/m]; 0 beyond five widths from the peak.
     #[must_use]
     pub fn density(&self, [kx, ky]: [f64; 2]) -> f64 {
         let k = kx.hypot(ky);
         let peak = TAU / self.wavelength;
         let width = RELATIVE_WIDTH * peak;
         let z = (k - peak) / width;
-        // The direction clockwise from azimuth, and its distance from that of the swell the short way round.
+        // The direction clockwise from azimuth, and its shortest angular distance from the swell's.
         let turn = (kx.atan2(ky) - self.toward + PI).rem_euclid(TAU) - PI;
         let t = turn / SPREAD;
         if z.abs() > CUT || t.abs() > CUT {
@@ -59,8 +59,8 @@ impl Swell {
         self.height * self.height / 16.0
     }
 
-    /// Waves that stand for it, with their variance \[m²\]: one of each cell of wavenumber and direction, at a place that
-    /// `jitter` draws from 0…1; none beyond `band` [rad/m], the largest wavenumber of the pixels.
+    /// Waves that represent the swell, with their variance \[m²\]: one per cell of wavenumber and direction, at a position
+    /// in the cell given by `jitter` in 0…1; none beyond `band` [rad/m], the largest wavenumber of the pixels.
     pub(crate) fn cells(&self, band: f64, mut jitter: impl FnMut() -> f64) -> Vec<([f64; 2], f64)> {
         let [low, high] = self.band();
         let step = [
@@ -106,7 +106,7 @@ impl Swell {
         waves
     }
 
-    /// Least and largest wavenumber with any density [rad/m].
+    /// Smallest and largest wavenumber of non-zero density [rad/m].
     #[must_use]
     pub fn band(&self) -> [f64; 2] {
         let peak = TAU / self.wavelength;
@@ -119,7 +119,7 @@ mod tests {
     use super::*;
     use crate::numeric::GaussLegendre;
 
-    /// ∬Ψ = H²/16 and the mean direction, in polar coordinates, around a swell across the cut of atan2 too.
+    /// ∬Ψ = H²/16 and the mean direction, in polar coordinates, including a swell across the branch cut of atan2.
     #[test]
     fn variance_and_direction() {
         for toward in [0.0, 1.0, PI, -2.5, 7.0] {
@@ -148,7 +148,7 @@ mod tests {
         }
     }
 
-    /// Over many seeds the waves hold H²/16; half a band holds half of it.
+    /// Over many seeds the waves have the variance H²/16; half a band has half of it.
     #[test]
     fn waves_have_the_variance() {
         let swell = Swell {
@@ -164,7 +164,7 @@ mod tests {
             };
             let count = 200;
             let mean = (0..count).map(variance).sum::<f64>() / f64::from(count as u32);
-            // Some 60 of the waves carry most: 1/√60 a seed, 1 % of the mean of 200; four times it.
+            // About 60 of the waves carry most of the variance: 1/√60 per seed, 1 % of the mean of 200; four times that.
             assert!((mean / (share * 0.25) - 1.0).abs() < 0.04, "{mean}");
         }
         let [one, other] = [0.0, 7.0].map(|time| swell.waves(1, time, 20.0, 1.0));

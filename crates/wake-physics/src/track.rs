@@ -1,19 +1,19 @@
-//! The track of a ship, straight or on a circle: where it is, which way it goes, and places seen from it.
+//! Track of a ship, straight or on a circle: its place, its direction, and places seen from it.
 
 use crate::raster::Raster;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-/// A ship's place and direction at one instant, and the curve it came along.
+/// Place and direction of a ship at one instant, and the curve along which it came.
 ///
-/// Places seen from the ship are (ξ, η): ξ forward of midship along the track, η to port of it. On a track that turns ξ is
-/// the length of its arc to the point nearest to the place, negative astern. A ship has turned by half a circle and came
+/// Places seen from the ship are (ξ, η): ξ forward of midship along the track, η to port of it. On a turning track ξ is the
+/// length of arc to the point of the track nearest to the place, negative astern. The ship has turned by half a circle and came
 /// straight before; ahead, its track is a quarter of the circle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Track {
     /// Midship (x, y) \[m\].
     pub position: [f64; 2],
-    /// Unit vector (x, y) the ship moves along.
+    /// Unit vector (x, y) along which the ship moves.
     pub forward: [f64; 2],
     /// Curvature κ [1/m]: the turn to starboard over the distance run \[rad/m\]; 0 on a straight track.
     pub curvature: f64,
@@ -70,7 +70,7 @@ impl Track {
         [-self.forward[1], self.forward[0]]
     }
 
-    /// Whether the ship turns, and if so the radius \[m\] and the side, 1 to starboard and −1 to port.
+    /// Radius \[m\] and side of the turn, 1 to starboard and −1 to port; `None` on a straight track.
     pub(crate) fn turn(&self) -> Option<(f64, f64)> {
         (self.curvature != 0.0).then(|| (self.curvature.abs().recip(), self.curvature.signum()))
     }
@@ -83,7 +83,7 @@ impl Track {
         }
     }
 
-    /// The place and direction of the ship at ξ of its track \[m\], negative before now.
+    /// Place and direction of the ship at ξ of its track \[m\], negative for the past.
     #[must_use]
     pub fn at(&self, along: f64) -> Self {
         let Some((radius, _)) = self.turn() else {
@@ -128,7 +128,7 @@ impl Track {
         [radius * angle, side * (ahead.hypot(outward) - radius)]
     }
 
-    /// The place (x, y) \[m\] of what is seen from the ship at (ξ, η) \[m\].
+    /// The place (x, y) \[m\] of a point seen from the ship at (ξ, η) \[m\].
     #[must_use]
     pub(crate) fn on_sea(&self, [along, port]: [f64; 2]) -> [f64; 2] {
         if self.turn().is_some() {
@@ -140,7 +140,7 @@ impl Track {
         [self.position[0] + dx, self.position[1] + dy]
     }
 
-    /// A vector (along the track, to port) at the ship in the directions (x, y).
+    /// Converts a vector (along the track, to port) at the ship to the directions (x, y).
     #[must_use]
     pub fn turned(&self, [along, across]: [f64; 2]) -> [f64; 2] {
         let ([fx, fy], [px, py]) = (self.forward, self.port());
@@ -155,14 +155,14 @@ impl Track {
             .map(|(i, j)| self.seen_from_ship([raster.x(j), raster.y(i)]))
     }
 
-    /// No place of a raster is farther astern than this \[m\], at least 0.
+    /// Upper bound on the distance astern of any place of a raster \[m\], at least 0.
     pub(crate) fn farthest_astern(&self, raster: &Raster) -> f64 {
         let corners = self.straight().corners(raster);
         match self.turn() {
             None => corners.iter().map(|c| -c[0]).fold(0.0, f64::max),
             Some((radius, _)) => {
-                // The point of the track nearest to a place is no farther from it than the ship is, so that its chord to
-                // the ship is twice that at most, and its arc is π/2 times the chord.
+                // The point of the track nearest to a place is no farther from it than the ship is, so its chord to the ship is
+                // at most twice that distance, and its arc is at most π/2 times the chord.
                 let distances = corners.iter().map(|c| c[0].hypot(c[1]));
                 let farthest = distances.fold(0.0, f64::max);
                 PI * farthest.min(radius)
@@ -175,8 +175,8 @@ impl Track {
         }
     }
 
-    /// The distances astern of midship \[m\] at which the perpendicular of the track may cross a raster, in order: on a turn
-    /// those of the half circle and of the straight line before it, else those of the straight track and none.
+    /// Distances astern of midship \[m\] at which the perpendicular of the track may cross a raster, in order: on a turn for the
+    /// half circle and for the straight line before it, otherwise for the straight track and an empty range.
     pub(crate) fn astern(&self, raster: &Raster) -> [[f64; 2]; 2] {
         let of = |straight: Self| {
             let corners = straight.corners(raster).map(|corner| -corner[0]);
@@ -192,7 +192,7 @@ impl Track {
         [[0.0, half_circle], before.map(|d| half_circle + d)]
     }
 
-    /// The columns of a row of a raster that may lie no farther than `reach` \[m\] off the track.
+    /// Columns of a row of a raster that may lie within `reach` \[m\] of the track.
     pub(crate) fn columns_within(&self, raster: &Raster, row: usize, reach: f64) -> Range<usize> {
         if self.turn().is_some() {
             return 0..raster.columns;
@@ -253,7 +253,7 @@ mod tests {
         }
     }
 
-    /// Heading 0: port is toward −x. There and back again changes nothing.
+    /// Heading 0: port is toward −x. The round trip changes nothing.
     #[test]
     fn seen_from_ship_and_back() {
         let north = Track::new([0.0, 0.0], 0.0, 0.0);
@@ -280,7 +280,8 @@ mod tests {
         }
     }
 
-    /// A ship of heading 0 that turns to starboard on 500 m: its centre is to the east, it came from the south-east.
+    /// A ship of heading 0 that turns to starboard on a radius of 500 m: the centre is to the east, and it came from the
+    /// south-east.
     #[test]
     fn a_turn_to_starboard_by_hand() {
         let track = Track::turning([0.0; 2], 0.0, 0.0, 1.0 / 500.0);
@@ -289,7 +290,7 @@ mod tests {
         assert!(near(quarter.position, [500.0, -500.0]) && near(quarter.forward, [-1.0, 0.0]));
         let half = track.at(-500.0 * PI);
         assert!(near(half.position, [1000.0, 0.0]) && near(half.forward, [0.0, -1.0]));
-        // Before it a straight line.
+        // A straight line before it.
         let before = track.at(-500.0 * PI - 70.0);
         assert!(near(before.position, [1000.0, 70.0]) && near(before.forward, half.forward));
         // Outside the circle is to port.
@@ -302,7 +303,7 @@ mod tests {
             [-500.0 * PI - 70.0, -10.0]
         ));
         assert!(near(track.seen_from_ship([-20.0, 0.0]), [0.0, 20.0]));
-        // To port all is mirrored.
+        // A turn to port is the mirror image.
         let port = Track::turning([0.0; 2], 0.0, 0.0, -1.0 / 500.0);
         assert!(near(port.at(-250.0 * PI).position, [-500.0, -500.0]));
         assert!(near(
@@ -336,7 +337,7 @@ mod tests {
         }
     }
 
-    /// No place of a raster is farther astern than is said, on any of many turns.
+    /// No place of a raster is farther astern than the bound, on any of several turns.
     #[test]
     fn the_farthest_place_astern_is_a_bound() {
         let raster = Raster::image(40, 60, 25.0);

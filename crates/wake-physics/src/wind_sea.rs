@@ -1,11 +1,11 @@
-//! The wind sea as a density over wavenumber vectors, and its variances over a band.
+//! Density of the wind sea over wavenumber vectors, and its variances over a band.
 
 use crate::dispersion::{angular_frequency, depth_factor};
 use crate::scene::{SpectrumModel, SpreadingModel};
 use crate::spectrum::{Spectrum, deep_equivalent, from_deep_equivalent};
 use crate::spreading::{Spread, Spreading};
 
-/// Beyond this peak wavenumber [rad/m] (a wave of 0.06 mm) there is no wave: the sea is flat.
+/// Largest peak wavenumber [rad/m] (a wave of 0.06 mm); beyond it the sea is flat.
 const LARGEST_PEAK: f64 = 1e5;
 
 /// Parameters of a wind sea.
@@ -25,7 +25,7 @@ pub struct WindSea {
     pub spreading: SpreadingModel,
 }
 
-/// The density Ψ(kx, ky) of a wind sea, with everything that does not depend on k computed once.
+/// Density Ψ(kx, ky) of a wind sea, with precomputed constants.
 ///
 /// ```text
 /// Ψ(k, δ) = S(k) D(k, δ)/k,   ∬Ψ dkx dky = ⟨ζ²⟩,   δ the angle between k and the wind
@@ -67,7 +67,7 @@ pub(crate) struct Ring {
 }
 
 impl Ring {
-    /// Density Ψ \[m⁴\] of waves that travel at an angle to the wind, from its cosine.
+    /// Density Ψ \[m⁴\] of waves travelling at an angle to the wind, given its cosine.
     pub(crate) fn psi(&self, cos_angle: f64) -> f64 {
         self.level * self.spread.density(cos_angle)
     }
@@ -86,12 +86,12 @@ impl DirectionalSpectrum {
             spreading,
             wind: [sin, cos],
             depth: sea.depth,
-            // Not a number counts as flat too.
+            // NaN counts as flat, too.
             flat: !(sea.wind_speed > 0.0 && peak < LARGEST_PEAK),
         }
     }
 
-    /// Whether there is no wave at all.
+    /// Whether there are no waves.
     #[must_use]
     pub(crate) fn is_flat(&self) -> bool {
         self.flat
@@ -109,7 +109,7 @@ impl DirectionalSpectrum {
         self.depth
     }
 
-    /// Spreading, a function of the deep-water equivalent of k.
+    /// Spreading, as a function of the deep-water equivalent of k.
     #[must_use]
     pub fn spreading(&self) -> &Spreading {
         &self.spreading
@@ -147,7 +147,7 @@ impl DirectionalSpectrum {
         }
     }
 
-    /// The waves of one wavenumber in all directions; `None` where there is none.
+    /// The waves of one wavenumber in all directions; `None` if there are none.
     pub(crate) fn ring(&self, wavenumber: f64) -> Option<Ring> {
         let s = self.omnidirectional(wavenumber);
         (s > 0.0).then(|| Ring {
@@ -156,16 +156,16 @@ impl DirectionalSpectrum {
         })
     }
 
-    /// Variances of the waves from `low` to `high` seen at an incidence.
+    /// Variances of the waves from `low` to `high` viewed at an incidence.
     ///
     /// ```text
     /// ⟨sx²⟩ = ∫k² S ½(1 + a₂ cos 2β) dk      ⟨v_r²⟩ = ∫ω² S [cos²θ + coth²(kh) sin²θ ½(1 + a₂ cos 2β)] dk
     /// ```
     ///
-    /// with a₂ the second harmonic of the spreading and β the angle of the wind to +x. Gauss–Legendre panels
-    /// of 8 nodes, 0.3 wide in ln k, with a limit at the peak.
+    /// with a₂ the second harmonic of the spreading and β the angle of the wind to +x. Integrated by Gauss–Legendre panels
+    /// of 8 nodes, 0.3 wide in ln k, with a panel limit at the peak.
     ///
-    /// - `low`, `high` wavenumbers [rad/m], from 0 to infinite (cut at 10⁵); no waves if `high` ≤ `low`
+    /// - `low`, `high` wavenumbers [rad/m], from 0 to infinity (cut at 10⁵); no waves if `high` ≤ `low`
     /// - `incidence` θ \[rad\]
     #[must_use]
     pub fn moments(&self, low: f64, high: f64, incidence: f64) -> Moments {
@@ -221,8 +221,7 @@ impl DirectionalSpectrum {
     }
 }
 
-/// Positive nodes and their weights of Gauss–Legendre quadrature over [−1, 1] with 8 nodes
-/// (Abramowitz and Stegun, table 25.4).
+/// Positive nodes and their weights of 8-node Gauss–Legendre quadrature on [−1, 1] (Abramowitz and Stegun, table 25.4).
 pub(crate) const GAUSS_8: [(f64, f64); 4] = [
     (0.183434642495650, 0.362683783378362),
     (0.525532409916329, 0.313706645877887),
@@ -255,7 +254,7 @@ mod tests {
         }
     }
 
-    /// All variances against a plain double sum of Ψ|T|² over polar cells, with the factors of the waves.
+    /// All variances against a plain double sum of Ψ|T|² over polar cells.
     #[test]
     fn moments_are_the_double_integral() {
         let incidence = 0.5;
@@ -311,8 +310,8 @@ mod tests {
                 m.radial_acceleration,
             ];
             for (g, e) in got.iter().zip(expected) {
-                // The sum's own error: the cusp of small exponents at δ = π costs up to one angle step, 1/720,
-                // of the little that runs there; the kink of the JONSWAP peak a step² of 1e-4.
+                // The sum's own error: the cusp of small exponents at δ = π costs up to one angular step, 1/720, of the few
+                // waves there; the kink of the JONSWAP peak costs a squared step of 1e-4.
                 assert!(
                     (g - e).abs() < 1e-3 * e.abs(),
                     "{model:?} {got:?} {expected:?}"
@@ -336,7 +335,7 @@ mod tests {
                 ..sea(SpectrumModel::Elfouhaily, SpreadingModel::Elfouhaily)
             });
             let m = spectrum.moments(0.0, f64::INFINITY, 0.0);
-            // One unit of the last digit; the table has g = 9.81.
+            // One unit of the last digit; the table uses g = 9.81.
             assert!((4.0 * m.elevation.sqrt() - height).abs() < 1.5e-3);
             assert!((m.slope_xx - up).abs() < 3e-5, "{m:?}");
             assert!((m.slope_yy - cross).abs() < 3e-5, "{m:?}");
@@ -344,15 +343,15 @@ mod tests {
         }
     }
 
-    /// `σ_v` = 0.0646 U₁₉.₅ from above (closed form), and parts that add up.
+    /// `σ_v` = 0.0646 U₁₉.₅ viewed from above (closed form), and parts that add up.
     #[test]
     fn vertical_velocity_of_the_developed_sea() {
         let spectrum = DirectionalSpectrum::new(&sea(
             SpectrumModel::PiersonMoskowitz,
             SpreadingModel::Hasselmann,
         ));
-        // Surface tension matters beyond 30 rad/m, where ∫ω²S has 0.4 % left: stop there, and add the
-        // remainder α g/(2k) of the closed form.
+        // Surface tension matters beyond 30 rad/m, where 0.4 % of ∫ω²S is left: the sum stops there, and the remainder α
+        // g/(2k) is added in closed form.
         let cut = 30.0;
         let m = spectrum.moments(0.0, cut, 0.0);
         let sigma = (m.radial_velocity + 0.5 * 0.0081 * GRAVITY / cut).sqrt();
@@ -368,7 +367,7 @@ mod tests {
         assert!((sum / m.radial_velocity - 1.0).abs() < 1e-6);
     }
 
-    /// Shallow water lowers the waves and shortens their peak; deep water of finite depth changes nothing.
+    /// Shallow water lowers the waves and shortens their peak; deep water of finite depth has no effect.
     #[test]
     fn depth_lowers_the_waves() {
         for model in MODELS {
@@ -409,7 +408,7 @@ mod tests {
         }
     }
 
-    /// Every corner of the allowed scenes: finite and not negative.
+    /// Every extreme of the allowed scenes gives finite, non-negative values.
     #[test]
     fn corners_are_finite() {
         for model in MODELS {

@@ -13,22 +13,22 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 use std::sync::LazyLock;
 
-/// The rule of the integrals over the window: exact to rounding up to the distance [`FARTHEST`].
+/// Quadrature rule for integrals over the window: exact up to rounding to the distance [`FARTHEST`].
 static RULE: LazyLock<GaussLegendre> = LazyLock::new(|| GaussLegendre::new(96));
 
-/// Steps of the searches for zeros.
+/// Bisection steps of the searches for zeros.
 const HALVINGS: usize = 60;
 
-/// Farthest sidelobe looked at \[1/B\].
+/// Farthest sidelobe considered \[1/B\].
 const FARTHEST: f64 = 20.0;
 
 /// Weight over the bandwidth.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Window {
-    /// W = 1: the narrowest response, sidelobes of −13 dB.
+    /// W = 1: the narrowest response, with sidelobes of −13 dB.
     Uniform,
-    /// W = α + (1 − α) cos 2πf with α from 0.5 to 1; 0.54 is Hamming's own.
+    /// W = α + (1 − α) cos 2πf with α from 0.5 to 1; Hamming's own value is 0.54.
     Hamming(f64),
     /// W = I₀(β√(1 − 4f²))/I₀(β) with β from 0 to 10.
     Kaiser(f64),
@@ -50,7 +50,7 @@ impl Window {
         }
     }
 
-    /// Response in amplitude h, 1 at the distance 0.
+    /// Response in amplitude h, 1 at distance 0.
     ///
     /// - `x`: distance \[1/B\]
     #[must_use]
@@ -82,13 +82,13 @@ impl Window {
         2.0 * root(half, [0.0, self.first_null()], HALVINGS)
     }
 
-    /// Loss of the peak of a point over that of the matched filter \[dB\]: −10 log₁₀ (∫W df)²/∫W² df.
+    /// Loss of a point's peak relative to the matched filter \[dB\]: −10 log₁₀ (∫W df)²/∫W² df.
     #[must_use]
     pub fn loss(self) -> f64 {
         -10.0 * (self.moment(1).powi(2) / self.moment(2)).log10()
     }
 
-    /// Correlation ρ² of the intensity of a rough surface at a distance x \[1/B\].
+    /// Correlation ρ² of the intensity of a rough surface at distance x \[1/B\].
     #[must_use]
     pub fn correlation(self, x: f64) -> f64 {
         let panels = (x.abs() / FARTHEST).ceil().max(1.0);
@@ -100,7 +100,7 @@ impl Window {
         (transform / self.moment(2)).powi(2)
     }
 
-    /// Intensity transfer function at the frequency f/B, 1 at 0: ∫W(u − f/2) W(u + f/2) du/∫W² du; 0 from f = 1 on.
+    /// Intensity transfer function at the frequency f/B, 1 at 0: ∫W(u − f/2) W(u + f/2) du/∫W² du; 0 for f ≥ 1.
     #[must_use]
     pub fn intensity_transfer(self, f: f64) -> f64 {
         let shared = (1.0 - f.abs()).max(0.0);
@@ -108,11 +108,11 @@ impl Window {
         shared * over_band(pair) / self.moment(2)
     }
 
-    /// Largest correlation of two pixels of a row or a column.
+    /// Largest correlation between two pixels of a row or a column.
     ///
     /// - `pixels`: pixel spacing over resolution, above 0
     ///
-    /// Where it is small, independent pixels suffice: at a spacing of 1.5 resolutions 0.042 (uniform) and 0.002
+    /// Where it is small, independent pixels suffice: at a spacing of 1.5 resolutions it is 0.042 (uniform) and 0.002
     /// (Hamming 0.75), at one resolution 0.016 and 0.099.
     #[must_use]
     pub fn pixel_correlation(self, pixels: f64) -> f64 {
@@ -123,7 +123,7 @@ impl Window {
             .fold(0.0, f64::max)
     }
 
-    /// Equivalent number of `count` looks, each of the bandwidth B, that overlap by a share of it.
+    /// Equivalent number of `count` looks, each of bandwidth B, that overlap by the given share of it.
     ///
     /// ```text
     /// K/(1 + 2 Σ (1 − k/K) r_k),     r_k = [∫W(f) W(f − k(1 − overlap)) df / ∫W² df]²
@@ -137,7 +137,7 @@ impl Window {
         })
     }
 
-    /// Correlation of two looks whose bands lie `shift` bandwidths apart.
+    /// Correlation of two looks whose bands are `shift` bandwidths apart.
     fn look_correlation(self, shift: f64) -> f64 {
         if shift >= 1.0 {
             return 0.0;
@@ -164,7 +164,7 @@ impl Window {
     }
 }
 
-/// Number of independent values in the sum of `count`, of which two that are `lag` apart correlate by `correlation(lag)`.
+/// Number of independent values in a sum of `count` values whose correlation at a lag is `correlation(lag)`.
 fn equivalent(count: u32, correlation: impl Fn(u32) -> f64) -> f64 {
     let n = f64::from(count.max(1));
     let pairs: f64 = (1..count)
@@ -173,7 +173,7 @@ fn equivalent(count: u32, correlation: impl Fn(u32) -> f64) -> f64 {
     n / (1.0 + 2.0 * pairs)
 }
 
-/// ∫ over the bandwidth.
+/// Integral over the bandwidth.
 fn over_band(f: impl Fn(f64) -> f64) -> f64 {
     RULE.integrate([-0.5, 0.5], f)
 }
@@ -211,7 +211,7 @@ mod tests {
         Window::Kaiser(2.5),
     ];
 
-    /// Figures by which windows are known.
+    /// Characteristic figures of windows.
     impl Window {
         /// Highest sidelobe of h² over its peak \[dB\].
         fn peak_sidelobe(self) -> f64 {
@@ -224,13 +224,13 @@ mod tests {
 
         /// Length over which the intensity is correlated, ∫ρ² dx = ∫W⁴ df/(∫W² df)² \[1/B\].
         ///
-        /// A pixel of a smaller spacing holds less than one independent sample.
+        /// Pixels of a smaller spacing hold less than one independent sample each.
         fn correlation_length(self) -> f64 {
             self.moment(4) / self.moment(2).powi(2)
         }
     }
 
-    /// The figures of the windows, computed elsewhere from the same definitions and printed to the last digit here.
+    /// Figures of the windows, computed by another program from the same definitions, to the last printed digit.
     #[test]
     fn resolution_sidelobes_and_loss() {
         let expected = [
@@ -241,7 +241,7 @@ mod tests {
             [1.042, -20.9, 0.36, 1.264],
         ];
         for (window, [width, peak, loss, length]) in WINDOWS.into_iter().zip(expected) {
-            // Half a unit of the last digit printed.
+            // Half a unit of the last printed digit.
             assert!((window.width() - width).abs() < 6e-4, "{window:?}");
             assert!((window.peak_sidelobe() - peak).abs() < 0.06, "{window:?}");
             assert!((window.loss() - loss).abs() < 6e-3, "{window:?}");
@@ -255,7 +255,7 @@ mod tests {
         assert!((Window::Uniform.width() - 2.0 * 1.391_557_378 / PI).abs() < 1e-9);
     }
 
-    /// Of a uniform window the triangle 1 − |f|; of all windows the transform of |h|², summed one by one.
+    /// For a uniform window the triangle 1 − |f|; for all windows the numerical transform of |h|².
     #[test]
     fn the_transfer_of_the_intensity_is_that_of_the_squared_response() {
         for f in [0.0, 0.2, 0.5, 0.9, 1.0, 1.3] {
@@ -272,7 +272,7 @@ mod tests {
                         .map(|n| window.response(at(n)).powi(2) * (TAU * k * at(n)).cos())
                         .sum()
                 };
-                // Beyond 200 resolutions |h|² leaves 1/(2π² · 200) of the whole at most.
+                // Beyond 200 resolutions, |h|² leaves at most 1/(2π² · 200) of the total.
                 let found = sum(f) / sum(0.0);
                 assert!(
                     (window.intensity_transfer(f) - found).abs() < 5e-4,
@@ -316,7 +316,7 @@ mod tests {
         }
         assert!((Window::Uniform.pixel_correlation(1.5) - 0.042).abs() < 6e-4);
         assert!((Window::Hamming(0.75).pixel_correlation(1.0) - 0.099).abs() < 6e-4);
-        // Uniform, half a resolution: lag 1; at 1.13 resolutions the nearest lag is a null, the next is too.
+        // Uniform: at half a resolution, lag 1; at 1.13 resolutions the nearest lag is a null, and so is the next.
         assert!(Window::Uniform.pixel_correlation(1.0 / Window::Uniform.width()) < 1e-12);
     }
 
@@ -364,13 +364,13 @@ mod tests {
             let found = window.overlapping_looks(count, overlap);
             assert!((found - expected).abs() < 6e-3, "{window:?}: {found}");
         }
-        // One band, K times over, is one look.
+        // One band repeated K times is one look.
         assert!((Window::Uniform.overlapping_looks(7, 1.0) - 1.0).abs() < 1e-12);
     }
 
-    /// A Sentinel-1 IW GRDH product: slant bandwidth 14.1 MHz at an incidence where ρ is 20.3 m, Hamming 0.70,
-    /// 10 m pixels; azimuth unwindowed, 18.4 m. Measured on its sea: 0.63 0.15 0.01 and 0.43 −0.01, each to ±0.01
-    /// for the size of the crop and ±0.005 of rounding; the annotated width is rounded to 0.05 m.
+    /// A Sentinel-1 IW GRDH product: slant bandwidth 14.1 MHz at an incidence where ρ is 20.3 m, Hamming 0.70, 10 m pixels;
+    /// azimuth unweighted, 18.4 m. Measured on its sea: 0.63 0.15 0.01 and 0.43 −0.01, each to ±0.01 for the size of the
+    /// crop and ±0.005 of rounding; the annotated width is rounded to 0.05 m.
     #[test]
     fn lags_of_a_real_product() {
         let measured = [(Window::Hamming(0.70), 20.3, [0.63, 0.15, 0.01])];

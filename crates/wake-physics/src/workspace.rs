@@ -1,18 +1,18 @@
-//! Blocks of memory and plans of FFTs that one simulation leaves to the next.
+//! Memory buffers and FFT plans that one simulation leaves to the next.
 //!
-//! A block that is freed goes back to the system, and every page of the next one is a page fault: a quarter of the time
-//! of a simulation. Nothing here changes a result: what is taken has any content, and its user overwrites it.
+//! A freed block returns to the system, and every page of the next one costs a page fault, in total a quarter of the time
+//! of a simulation. Results are unaffected: buffers have any content and are overwritten by their user.
 
 use crate::raster::{Field, Raster};
 use num_complex::{Complex, Complex32, Complex64};
 use rayon::iter::ParallelIterator;
 use rustfft::FftPlanner;
 
-/// Blocks of values, kept to be taken again.
+/// Buffers kept for reuse.
 #[derive(Debug)]
 pub(crate) struct Shelf<T> {
     blocks: Vec<Vec<T>>,
-    /// Makes a block of zeros.
+    /// Allocates a block of zeros.
     fresh: fn(usize) -> Vec<T>,
 }
 
@@ -24,11 +24,11 @@ impl<T: Copy + Default> Shelf<T> {
         }
     }
 
-    /// `len` values of any content.
+    /// Takes a buffer of `len` values with any content.
     pub(crate) fn take(&mut self, len: usize) -> Vec<T> {
         let blocks = &mut self.blocks;
         let fits = |block: &Vec<T>| block.capacity() >= len;
-        // The smallest that fits; where none does, the largest makes room for a new one.
+        // The smallest block that fits; if none does, the largest is dropped for a new one.
         let order = |&n: &usize| (!fits(&blocks[n]), blocks[n].capacity().abs_diff(len));
         let block = (0..blocks.len()).min_by_key(order);
         match block.map(|n| blocks.swap_remove(n)) {
@@ -44,7 +44,7 @@ impl<T: Copy + Default> Shelf<T> {
         self.blocks.len()
     }
 
-    /// Puts a block back.
+    /// Returns a buffer.
     pub(crate) fn give(&mut self, block: Vec<T>) {
         if block.capacity() > 0 {
             self.blocks.push(block);
@@ -52,7 +52,7 @@ impl<T: Copy + Default> Shelf<T> {
     }
 }
 
-/// What stages take their blocks and the plans of their FFTs from.
+/// Source of buffers and FFT plans for the stages.
 pub(crate) struct Workspace {
     /// Values of fields.
     pub(crate) floats: Shelf<f32>,
@@ -65,9 +65,9 @@ pub(crate) struct Workspace {
 impl Default for Workspace {
     fn default() -> Self {
         Self {
-            // The system's own zeros, whose pages come when a stage first writes to them, on all threads.
+            // Zeros from the system, whose pages are allocated when a stage first writes to them, on all threads.
             floats: Shelf::new(|len| vec![0.0; len]),
-            // Zeros of a compound type are written one by one: by all threads.
+            // Zeros of a compound type are written one by one, hence by all threads.
             spectra: (
                 Shelf::new(|len| rayon::iter::repeat_n(Complex::default(), len).collect()),
                 Shelf::new(|len| rayon::iter::repeat_n(Complex::default(), len).collect()),
@@ -88,7 +88,7 @@ impl std::fmt::Debug for Workspace {
 }
 
 impl Workspace {
-    /// A field of any content.
+    /// A field with any content.
     pub(crate) fn field(&mut self, raster: &Raster) -> Field {
         Field {
             rows: raster.rows,
@@ -104,7 +104,7 @@ impl Workspace {
         field
     }
 
-    /// Takes the block of a field back.
+    /// Takes back the buffer of a field.
     pub(crate) fn give(&mut self, field: Field) {
         self.floats.give(field.values);
     }
@@ -114,7 +114,7 @@ impl Workspace {
 mod tests {
     use super::*;
 
-    /// The block that fits best is taken, and there are never more than were out at once.
+    /// The best-fitting block is taken, and there are never more blocks than were in use at once.
     #[test]
     fn blocks_are_used_again() {
         let mut shelf = Shelf::new(|len| vec![7u8; len]);
@@ -128,7 +128,7 @@ mod tests {
         let eleven = shelf.take(11);
         assert_eq!((eleven.as_ptr(), eleven.len()), (places[1], 11));
         shelf.give(eleven);
-        // None fits: the large one is dropped for a larger one.
+        // None fits: the large block is replaced by a larger one.
         let block = shelf.take(1000);
         assert_eq!(block, vec![7; 1000]);
         shelf.give(block);

@@ -1,9 +1,9 @@
-//! A large image in blocks that overlap, and how they are blended.
+//! Division of a large image into overlapping blocks, and blending weights.
 
 use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 
-/// Pixels along a side of a block, and of the overlap of neighbours.
+/// Side of a block, and overlap of neighbours \[pixels\].
 const BLOCK: usize = 1024;
 const OVERLAP: usize = 128;
 
@@ -13,12 +13,12 @@ pub(crate) struct Axis {
     length: usize,
 }
 
-/// What a block adds at one of its lines or pixels.
+/// Blending weights of a block at one of its lines or pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Weight {
-    /// Of means: the weights of all blocks add up to 1.
+    /// Weight of means; the weights of all blocks sum to 1.
     pub(crate) mean: f32,
-    /// Of independent deviations from them: the squares of the weights add up to 1, so that variances stay.
+    /// Weight of independent deviations from means; the squares of the weights sum to 1, which preserves the variance.
     pub(crate) deviation: f32,
 }
 
@@ -41,7 +41,7 @@ impl Axis {
         start..(start + BLOCK).min(self.length)
     }
 
-    /// Lines that no block after the first `n` touches.
+    /// Number of lines to which no block after the first `n` contributes.
     pub(crate) fn done(self, n: usize) -> usize {
         match n == self.count() {
             true => self.length,
@@ -49,7 +49,7 @@ impl Axis {
         }
     }
 
-    /// What block `n` adds at each of its lines or pixels.
+    /// Weights of block `n` at each of its lines or pixels.
     pub(crate) fn weights(self, n: usize) -> Vec<Weight> {
         let block = self.block(n);
         let ramp = |k: usize| ((k as f64 + 0.5) / OVERLAP as f64).min(1.0);
@@ -76,7 +76,7 @@ impl Axis {
 mod tests {
     use super::*;
 
-    /// Means add up to 1 and variances to 1 everywhere, whatever the length.
+    /// Weights of means and squared weights of deviations sum to 1 everywhere, for any length.
     #[test]
     fn weights_keep_means_and_variances() {
         for length in [1, 130, 1024, 1025, 1920, 1921, 5000] {

@@ -1,34 +1,34 @@
-//! What can go wrong.
+//! The error type of this crate.
 
 use std::path::PathBuf;
 
-/// Result of this crate.
+/// Result of a fallible function of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// What can go wrong when a product is simulated.
+/// A product could not be simulated, or a ship in it not estimated.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The template, or a file that is written.
+    /// The product cannot be read or written.
     #[error(transparent)]
     Product(#[from] wake_geo::Error),
-    /// A value of a scene.
+    /// A scene is invalid or could not be simulated.
     #[error(transparent)]
     Scene(#[from] wake_physics::Error),
-    /// A file of ships.
+    /// A file of ships is invalid.
     #[error("{}: {why}", path.display())]
     Ships {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it, and what is expected.
+        /// The fault, and the expected content.
         why: String,
     },
-    /// A product that cannot be a template.
+    /// A product that cannot be used.
     #[error("{} cannot be simulated: {why}", path.display())]
     Template {
         /// The product.
         path: PathBuf,
-        /// Why, and what can be.
+        /// The reason, and what is supported.
         why: String,
     },
     /// A file that cannot be read or written.

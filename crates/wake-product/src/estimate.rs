@@ -1,4 +1,4 @@
-//! Ship and wind of a wake in a product.
+//! Estimation of ship and wind from a wake in a product.
 
 use std::ops::Range;
 
@@ -13,35 +13,35 @@ use crate::scenes::{Scenes, Wind, in_part, in_scene, on_map, sentinel};
 /// Largest rows and columns of the estimated part.
 const SIDE: usize = 128;
 
-/// Part of the side that the middle of the estimated part lies astern of the wake's tip.
+/// Distance astern from the wake's tip to the middle of the estimated part, as a share of the part's side.
 const ASTERN: f64 = 0.25;
 
-/// Estimate of ship and wind, with the directions of the map.
+/// Estimate of ship and wind, with directions on the map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MappedEstimate {
-    /// The estimate: its scene has the directions of the image.
+    /// The estimate, with directions in the image.
     pub estimate: Estimate,
     /// Heading of the ship, clockwise from true north \[degrees\].
     pub heading: f64,
-    /// Where the wind blows to, clockwise from true north \[degrees\].
+    /// Direction that the wind blows toward, clockwise from true north \[degrees\].
     pub wind_toward: f64,
 }
 
 /// Estimates ship and wind around a wake of a Sentinel-1 product.
 ///
-/// σ⁰ of at most 128 × 128 pixels around the wake is read with its thermal noise; pixels darker than the noise count as noise. The radar is that of the
-/// annotation, the water deep, the hull form that of the default scene.
+/// Uses σ⁰ of at most 128 × 128 pixels around the wake, with thermal noise added back; pixels darker than the noise count as
+/// noise. The radar is taken from the annotation, the water is deep, and the hull form is the default scene's.
 ///
-/// - `tip`: line and pixel where the wake begins
-/// - `heading` of the ship, clockwise from true north \[degrees\], within some 7 degrees
+/// - `tip`: line and pixel of the wake's tip
+/// - `heading`: heading of the ship, clockwise from true north \[degrees\], accurate to some 7 degrees
 ///
 /// # Errors
 ///
-/// [`Error::Template`] for a product whose radar is not known or a part without data (land, border), [`Error::Product`] for pixels that cannot be
-/// read, [`Error::Scene`] as [`estimate`].
+/// [`Error::Template`] for a product of an unsupported radar or a part without data (land, border), [`Error::Product`] for pixels
+/// that cannot be read, [`Error::Scene`] as [`estimate`].
 pub fn estimate_wake(product: &Product, tip: [f64; 2], heading: f64) -> Result<MappedEstimate> {
     let sentinel = sentinel(product)?;
-    // The wind is estimated; its direction does not count.
+    // The wind is estimated, so this direction has no effect.
     let wind = Wind {
         speed: Scene::default().sea.wind_speed,
         toward: 0.0,
@@ -73,7 +73,7 @@ pub fn estimate_wake(product: &Product, tip: [f64; 2], heading: f64) -> Result<M
     })
 }
 
-/// Intensity of a part with its thermal noise, rows from the farthest line, and the mean noise, both in the unit of σ⁰.
+/// Intensity of a part with thermal noise, its rows in reverse order of lines, and the mean noise, both as σ⁰.
 fn with_noise(
     product: &Product,
     sentinel: &Sentinel1,

@@ -1,4 +1,4 @@
-//! The scene of each block: the radar of the product there, and ships and wind in its directions.
+//! Scene of each block: the product's local radar geometry, and ships and wind in image directions.
 
 use std::ops::Range;
 
@@ -18,13 +18,13 @@ pub struct Wind {
     pub toward: f64,
 }
 
-/// Ships farther than this from a block leave no wake in it that could be seen \[m\].
+/// Ships farther than this from a block leave no visible wake in it \[m\].
 const REACH: f64 = 12_000.0;
 
-/// Accuracy of the scenes, as in data sets for detectors: speckle of a few looks hides what is finer.
+/// Tolerance of the scenes, as in data sets for detectors: speckle of a few looks hides smaller errors.
 const TOLERANCE: f64 = 0.02;
 
-/// Everything that the scenes of the blocks are made from.
+/// Inputs of the scenes of all blocks.
 #[derive(Debug)]
 pub(crate) struct Scenes<'a> {
     product: &'a Product,
@@ -35,7 +35,7 @@ pub(crate) struct Scenes<'a> {
 }
 
 impl<'a> Scenes<'a> {
-    /// - `changes`: keys of a scene and their values, such as `sea.fetch=50e3`
+    /// - `changes`: assignments to keys of a scene, such as `sea.fetch=50e3`
     pub(crate) fn new(
         product: &'a Product,
         ships: &[ShipAt],
@@ -48,13 +48,13 @@ impl<'a> Scenes<'a> {
             "radar.polarization={}",
             sentinel.annotation().polarization.name()
         );
-        // A change comes last, so that it may ask for more.
+        // Changes come last, so that they can override the tolerance.
         let accuracy = format!("model.tolerance={TOLERANCE}");
         let mut assignments = vec![format!("radar.sensor={sensor}"), polarization, accuracy];
         assignments.extend_from_slice(changes);
         let mut base = Scene::default().with_assignments(&assignments)?;
         base.ships.clear();
-        // Noise is that of the product; ambiguities may lie in other blocks.
+        // Noise is added from the product's annotation; ambiguities may lie in other blocks, and are left out.
         base.radar.nesz = None;
         (base.radar.azimuth_ambiguity, base.radar.prf) = (None, None);
         base.radar.frequency = sentinel.annotation().radar_frequency;
@@ -73,7 +73,7 @@ impl<'a> Scenes<'a> {
         Ok(scenes)
     }
 
-    /// Incidence of a pixel \[degrees\], if the product says it.
+    /// Incidence angle of a pixel \[degrees\], if the product gives it.
     pub(crate) fn incidence(&self, line: f64, pixel: f64) -> Result<Option<f64>> {
         Ok(self.product.place(line, pixel)?.incidence)
     }
@@ -83,10 +83,10 @@ impl<'a> Scenes<'a> {
         &self.ships
     }
 
-    /// The scene of a block.
+    /// Makes the scene of a block.
     ///
-    /// Row 0 of a scene is the farthest along azimuth, line 0 of a product the first that was acquired: line l of a block of n
-    /// lines is row n − 1 − l.
+    /// Row 0 of a scene is the farthest along azimuth, line 0 of a product the first acquired: line l of a block of n lines is
+    /// row n − 1 − l.
     pub(crate) fn scene(
         &self,
         lines: &Range<usize>,
@@ -107,7 +107,7 @@ impl<'a> Scenes<'a> {
             scene.radar.incidence = incidence;
         }
         if let Some(ratio) = self.product.range_to_velocity(line, pixel)? {
-            // Displaced by as many lines as in the product, whose lines are not quite as far apart as its pixels.
+            // Keep displacements in lines as in the product, whose line spacing differs slightly from its pixel spacing.
             scene.radar.range_to_velocity = ratio * scene.grid.spacing / axes.line_spacing;
         }
         scene.sea.wind_toward = in_scene(&axes, self.wind.toward);
@@ -139,7 +139,7 @@ impl<'a> Scenes<'a> {
     }
 }
 
-/// (x, y) in the scene of a part \[m\].
+/// Position (x, y) in the scene of a part \[m\].
 ///
 /// - `at`: line and pixel of the product
 pub(crate) fn in_part(
@@ -155,8 +155,8 @@ pub(crate) fn in_part(
     ]
 }
 
-/// A direction clockwise from true north as that of a scene, clockwise from the direction of lines: so that a ship runs over the
-/// same pixels, though lines and pixels of the product are neither quite at right angles nor equally far apart \[degrees\].
+/// Converts a direction clockwise from true north to a scene's, clockwise from the direction of lines \[degrees\], so that a ship
+/// crosses the same pixels, although the product's axes are not quite orthogonal and have unequal spacing.
 pub(crate) fn in_scene(axes: &PixelAxes, toward: f64) -> f64 {
     let sine = |degrees: f64| degrees.to_radians().sin();
     let lines = sine(axes.pixel_azimuth - toward) / axes.line_spacing;
@@ -182,7 +182,7 @@ pub(crate) fn sentinel(product: &Product) -> Result<&Sentinel1> {
     })
 }
 
-/// The preset of the product's mode.
+/// Sensor preset for the product's mode.
 fn sensor(product: &Product, sentinel: &Sentinel1) -> Result<&'static str> {
     let annotation = sentinel.annotation();
     let near = |spacing: f64| {
@@ -214,8 +214,8 @@ fn sensor(product: &Product, sentinel: &Sentinel1) -> Result<&'static str> {
 mod tests {
     use super::*;
 
-    /// A step toward 30° on lines of 10.1 m toward 193° and pixels of 9.9 m toward 283.4°: so many lines and pixels as the scene's
-    /// direction has. With square pixels it is the angle from the direction of lines.
+    /// A step toward 30° on a grid with lines of 10.1 m toward 193° and pixels of 9.9 m toward 283.4° crosses lines and pixels in
+    /// the ratio of the scene's direction. With square pixels, that direction is the angle from the direction of lines.
     #[test]
     fn directions_lead_over_the_same_pixels() {
         let axes = |line_spacing, pixel_spacing, pixel_azimuth| PixelAxes {

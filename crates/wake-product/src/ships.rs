@@ -1,4 +1,4 @@
-//! Ships on the map.
+//! Positions and sizes of ships on the map.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use serde_json::{Map, Value};
 
 use crate::error::{Error, Result};
 
-/// A ship under way, by its place on Earth.
+/// A ship with its geographic position, heading, speed and size.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShipAt {
     /// Latitude of midship on WGS84, north positive \[degrees\].
@@ -25,17 +25,17 @@ pub struct ShipAt {
     pub draft: f64,
 }
 
-/// Most ships of a file.
+/// Largest number of ships in a file.
 const MOST_SHIPS: usize = 10_000;
-/// Length over beam and length over draft where a file gives the length alone: those of the ship of the default scene.
+/// Default ratios of length to beam and length to draft: those of the default scene's ship.
 const SLENDERNESS: [f64; 2] = [7.5, 19.5];
 
-/// Reads ships from a GeoJSON file: `Point` features with the properties `heading`, `speed` and `length`, if they are known
-/// also `beam` and `draft`. Other properties are not looked at.
+/// Reads ships from a GeoJSON file: `Point` features with the properties `heading`, `speed`, `length` and optionally `beam`
+/// and `draft`. Other properties are ignored.
 ///
 /// # Errors
 ///
-/// [`Error::Ships`] with the number of the feature and what it lacks, [`Error::File`] for a file that cannot be read.
+/// [`Error::Ships`] with the number of the invalid feature and the reason, [`Error::File`] for a file that cannot be read.
 pub fn read_ships(path: &Path) -> Result<Vec<ShipAt>> {
     let text = whole_files::read_text(path)?;
     let wrong = |why: String| Error::Ships {

@@ -1,4 +1,4 @@
-//! From a real annotation and ships on the map to a product.
+//! Simulation of a product from a real annotation and ships on the map.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -13,46 +13,47 @@ use crate::error::Result;
 use crate::scenes::{Scenes, Wind, sentinel};
 use crate::ships::ShipAt;
 
-/// What is simulated of a product, and over which sea.
+/// Part of a product to simulate, wind and other options.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Lines of the part; `None`: all.
+    /// Lines of the part; `None` for all.
     pub lines: Option<Range<usize>>,
-    /// Pixels of the part; `None`: all.
+    /// Pixels of the part; `None` for all.
     pub pixels: Option<Range<usize>>,
     /// The wind.
     pub wind: Wind,
-    /// Seed of everything that is drawn.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// Further keys of the scene and their values, such as `sea.fetch=50e3`.
+    /// Further assignments to keys of the scene, such as `sea.fetch=50e3`.
     pub changes: Vec<String>,
 }
 
-/// What was written.
+/// Files that were written.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Written {
     /// The product, a `.SAFE` folder.
     pub product: PathBuf,
-    /// The ships in it, a GeoJSON file beside the folder, with their lines and pixels.
+    /// GeoJSON file beside the folder with the ships in the part, and their lines and pixels.
     pub ships: PathBuf,
-    /// How many they are.
+    /// Number of ships in the part.
     pub count: usize,
 }
 
-/// Rows and columns of the open sea whose mean gives the brightness at an incidence.
+/// Rows and columns of open sea over which the mean brightness at an incidence angle is computed.
 const EVEN: usize = 32;
-/// Largest digital number, and the least of a pixel that holds data.
+/// Smallest digital number of a pixel with data, and largest digital number.
 const NUMBERS: [f64; 2] = [1.0, 65_535.0];
 
-/// Simulates the part of a product, and writes it with the ships' truth into a folder.
+/// Simulates a part of a product, and writes it with the ships as ground truth into a folder.
 ///
 /// - `template`: a Sentinel-1 product; its measurement is not needed
-/// - `done`: called with the lines of every written strip
+/// - `done`: called for every simulated strip with its number of lines
 ///
 /// # Errors
 ///
-/// [`Error::Template`](crate::Error::Template) for a product that cannot be simulated, [`Error::Scene`](crate::Error::Scene) for a value out of its range,
-/// [`Error::Product`](crate::Error::Product) for a part that leaves the image and for files that cannot be written.
+/// [`Error::Template`](crate::Error::Template) for a product that cannot be simulated, [`Error::Scene`](crate::Error::Scene) for
+/// a value out of range, [`Error::Product`](crate::Error::Product) for a part outside the image and for files that cannot be
+/// written.
 pub fn simulate(
     template: &Product,
     ships: &[ShipAt],
@@ -111,18 +112,18 @@ pub fn simulate(
     })
 }
 
-/// The image in strips of lines: σ⁰ without noise and speckle.
+/// The image in strips of lines: σ⁰ without noise and speckle, and unit-mean speckle.
 struct Strips<'a> {
     scenes: &'a Scenes<'a>,
     lines: Range<usize>,
     pixels: Range<usize>,
     seed: u64,
-    /// Incidence and logarithm of the mean σ⁰ of the open sea, in the middle of each block along a line.
+    /// Incidence angle and logarithm of the mean σ⁰ of open sea, in the middle of each block along a line.
     brightness: Vec<[f64; 2]>,
     simulator: Simulator,
-    /// Blocks along the lines that are in `sum` already.
+    /// Rows of blocks already added to `sum`.
     blocks: usize,
-    /// Lines that `sum` and `speckle` begin with.
+    /// First line in `sum` and `speckle`.
     first: usize,
     sum: Vec<f32>,
     speckle: Vec<f32>,
@@ -148,7 +149,7 @@ impl<'a> Strips<'a> {
         }
     }
 
-    /// Looks at the open sea in the middle of each block along a line.
+    /// Computes the brightness of open sea in the middle of each block along a line.
     fn look_at_brightness(&mut self) -> Result<()> {
         let across = Axis::new(self.pixels.len());
         let brightness = (0..across.count()).map(|n| -> Result<[f64; 2]> {
@@ -165,7 +166,7 @@ impl<'a> Strips<'a> {
         Ok(())
     }
 
-    /// Digital numbers of some lines, asked for in order.
+    /// Computes the digital numbers of lines, which must be requested in order.
     fn numbers(
         &mut self,
         sentinel: &Sentinel1,
@@ -195,7 +196,7 @@ impl<'a> Strips<'a> {
         Ok(())
     }
 
-    /// Drops the lines before one.
+    /// Drops the lines before a given one.
     fn forget(&mut self, line: usize) {
         let count = (line - self.first) * self.pixels.len();
         self.sum.drain(..count.min(self.sum.len()));
@@ -203,7 +204,7 @@ impl<'a> Strips<'a> {
         self.first = line;
     }
 
-    /// Simulates the next blocks along a line, and adds them to what the blocks before left.
+    /// Simulates the next row of blocks, and blends it with the previous row.
     fn add_row_of_blocks(&mut self) -> Result<()> {
         if self.blocks == 0 {
             self.look_at_brightness()?;
@@ -251,7 +252,7 @@ impl<'a> Strips<'a> {
         Ok(())
     }
 
-    /// By how much the open sea is brighter at each pixel of a block than in its middle.
+    /// Brightness of open sea at each pixel of a block, relative to the middle of the block.
     fn tilt(&self, pixels: &Range<usize>, column: usize) -> Result<Vec<f32>> {
         let middle = self.brightness[column];
         let line = 0.5 * (self.lines.start + self.lines.end - 1) as f64;
@@ -268,7 +269,7 @@ impl<'a> Strips<'a> {
     }
 }
 
-/// The value at a place by straight lines through points, and beyond them by the outermost line.
+/// Piecewise linear interpolation through points, with linear extrapolation beyond them.
 fn line_through(points: &[[f64; 2]], at: f64) -> f64 {
     if points.len() < 2 {
         return points.first().map_or(0.0, |point| point[1]);
@@ -280,7 +281,7 @@ fn line_through(points: &[[f64; 2]], at: f64) -> f64 {
     a[1] + (b[1] - a[1]) * (at - a[0]) / (b[0] - a[0])
 }
 
-/// The rows of a field from the last to the first.
+/// Values of a field with its rows in reverse order.
 fn upside_down(field: Field) -> Vec<f32> {
     let rows = field.values.chunks(field.columns.max(1)).rev();
     rows.flatten().copied().collect()
@@ -290,7 +291,7 @@ fn shifted(range: &Range<usize>, by: usize) -> Range<usize> {
     range.start + by..range.end + by
 }
 
-/// A seed of its own for every block.
+/// Seed of a block.
 fn block_seed(seed: u64, row: usize, column: usize) -> u64 {
     let mixed = |x: u64| (x ^ (x >> 29)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     mixed(mixed(seed ^ (row as u64 + 1)).wrapping_add(column as u64)) >> 1

@@ -1,4 +1,4 @@
-//! Values of the libraries as those of Python, and back.
+//! Conversions between values of the libraries and of Python.
 
 use crate::error::exceptions::SceneError;
 use crate::error::{Fault, Outcome};
@@ -10,13 +10,13 @@ use serde::Serialize;
 use serde_json::Value;
 use wake_physics::Field;
 
-/// Tables of a scene are no deeper.
+/// Largest depth of nested tables in a scene.
 const DEEPEST: usize = 8;
 
-/// No array of numbers in a scene or a recipe is longer.
+/// Largest length of an array of numbers in a scene or a recipe.
 const MOST_VALUES: usize = 10_000;
 
-/// Anything that has a form in JSON as dictionaries, lists, numbers and text.
+/// Converts a value that can be serialized as JSON to dictionaries, lists, numbers and text.
 pub(crate) fn json<'py>(py: Python<'py>, value: &impl Serialize) -> PyResult<Bound<'py, PyAny>> {
     let value = serde_json::to_value(value).map_err(|error| SceneError::new_err(error.to_string()));
     python_of(py, &value?)
@@ -49,7 +49,7 @@ fn python_of<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>>
     })
 }
 
-/// A TOML value as a value of Python; used of whole scenes, whose numbers TOML keeps, infinity too.
+/// Converts a TOML value to a Python value. Whole scenes use it, since TOML keeps their numbers, infinity too.
 pub(crate) fn python_of_toml<'py>(
     py: Python<'py>,
     value: &toml::Value,
@@ -77,9 +77,9 @@ pub(crate) fn python_of_toml<'py>(
     })
 }
 
-/// A value of Python as TOML: numbers (those of `NumPy`, too), text, lists and dictionaries; `None` for `None`.
+/// Converts a Python value to TOML: numbers (of `NumPy`, too), text, lists and dictionaries; `None` for `None`.
 ///
-/// - `name`: what it is, for errors
+/// - `name`: name of the value in errors
 pub(crate) fn toml_of(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Option<toml::Value>> {
     toml_at(name, value, DEEPEST)
 }
@@ -116,7 +116,7 @@ fn toml_at(name: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<Optio
         }
         return Ok(Some(values.into()));
     }
-    // Scalars and arrays of NumPy. A view of few bytes may have more values than memory holds.
+    // Scalars and arrays of NumPy. A view of few bytes may have more values than fit in memory.
     let size = value
         .getattr("size")
         .and_then(|size| size.extract::<usize>());
@@ -157,7 +157,7 @@ fn wrong(name: &str, found: &str) -> PyErr {
     ))
 }
 
-/// A whole number; seeds from 2⁶³ on are text in TOML.
+/// Converts a whole number to TOML, in which seeds of 2⁶³ and above are text.
 fn whole(name: &str, value: &Bound<'_, PyAny>) -> PyResult<toml::Value> {
     if let Ok(value) = value.extract::<i64>() {
         return Ok(value.into());
@@ -168,12 +168,12 @@ fn whole(name: &str, value: &Bound<'_, PyAny>) -> PyResult<toml::Value> {
     Ok(value.to_string().into())
 }
 
-/// A field as an array `[rows, columns]`, without a copy.
+/// Converts a field to an array `[rows, columns]`, without a copy.
 pub(crate) fn array_of<'py>(py: Python<'py>, field: Field) -> PyResult<Bound<'py, PyArray2<f32>>> {
     array2(py, field.values, [field.rows, field.columns])
 }
 
-/// Values as an array `[rows, columns]`, without a copy.
+/// Converts values to an array `[rows, columns]`, without a copy.
 pub(crate) fn array2<T: Element>(
     py: Python<'_>,
     values: Vec<T>,
@@ -182,7 +182,7 @@ pub(crate) fn array2<T: Element>(
     PyArray1::from_vec(py, values).reshape(size)
 }
 
-/// Checks that `count` images of `[rows, columns]` pixels, `bytes` each, fit in memory.
+/// Checks that `count` images of `[rows, columns]` pixels of `bytes` bytes fit in half of the free memory.
 pub(crate) fn check_memory(
     what: &str,
     count: usize,
@@ -193,7 +193,7 @@ pub(crate) fn check_memory(
         .iter()
         .try_fold(1u64, |product, &n| product.checked_mul(n as u64));
     let free = wake_physics::available_memory().unwrap_or(u64::MAX);
-    // An array that takes all that is free leaves nothing to compute it with.
+    // An array that fills the free memory leaves none for computing it.
     match needed.filter(|&needed| needed <= free / 2) {
         Some(_) => Ok(()),
         None => Err(Fault::too_large(format!(

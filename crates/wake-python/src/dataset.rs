@@ -1,4 +1,4 @@
-//! Data sets: pairs by their number, batch by batch, and as folders.
+//! Data sets: pairs by index, in batches, and as folders.
 
 use crate::convert::{array_of, check_memory, toml_of};
 use crate::error::exceptions::RecipeError;
@@ -12,20 +12,20 @@ use std::path::PathBuf;
 use wake_dataset::{Manifest, Pair, Recipe, Shard, Simulated, Source};
 use wake_physics::Field;
 
-/// The endless data set of a recipe and a seed.
+/// Endless data set of a recipe and a seed.
 #[pyclass(frozen, name = "Simulated", module = "shipwake._core")]
 pub(crate) struct PySimulated(Simulated);
 
 #[pymethods]
 impl PySimulated {
-    /// A data set of a recipe by its name, with other values.
+    /// Returns the data set of a named recipe, with the given changes.
     #[staticmethod]
     fn named(name: &str, changes: &Bound<'_, PyDict>, seed: u64) -> PyResult<Self> {
         let changes = assignments(changes)?;
         Ok(caught(|| Self::of(&Recipe::named(name)?, &changes, seed))?)
     }
 
-    /// A data set of the text of a recipe file, with other values.
+    /// Returns the data set of a recipe file, given as text, with the given changes.
     #[staticmethod]
     fn from_toml(text: &str, changes: &Bound<'_, PyDict>, seed: u64) -> PyResult<Self> {
         let changes = assignments(changes)?;
@@ -34,7 +34,7 @@ impl PySimulated {
         })?)
     }
 
-    /// A data set of the tables of a recipe file, with other values.
+    /// Returns the data set of the tables of a recipe, with the given changes.
     #[staticmethod]
     fn from_tables(
         tables: &Bound<'_, PyDict>,
@@ -46,13 +46,13 @@ impl PySimulated {
         Self::from_toml(&text, changes, seed)
     }
 
-    /// The whole recipe as the text of a file.
+    /// Returns the whole recipe as the text of a recipe file.
     fn to_toml(&self) -> PyResult<String> {
         let text = toml::to_string(self.0.recipe());
         text.map_err(|error| RecipeError::new_err(error.to_string()))
     }
 
-    /// The seed of the set.
+    /// Seed of the data set.
     fn seed(&self) -> u64 {
         self.0.seed()
     }
@@ -63,12 +63,12 @@ impl PySimulated {
         (rows, columns)
     }
 
-    /// The scene of pair number `index`.
+    /// Scene of pair number `index`.
     fn scene(&self, index: u64) -> PyResult<PyScene> {
         Ok(caught(|| Ok(self.0.scene(index)?)).map(PyScene)?)
     }
 
-    /// Pair number `index`.
+    /// Returns pair number `index`.
     fn pair<'py>(
         &self,
         py: Python<'py>,
@@ -78,12 +78,12 @@ impl PySimulated {
         item(py, run(py, threads, || Ok(self.0.pair(index)?))?)
     }
 
-    /// Pair number `index` with everything but its image.
+    /// Returns pair number `index` with everything but its image.
     fn without_image<'py>(&self, py: Python<'py>, index: u64) -> PyResult<Bound<'py, PyDict>> {
         item(py, caught(|| Ok(self.0.pair_without_image(index)?))?)
     }
 
-    /// The files of pair number `index` by their endings: `json`, `png` and `txt`.
+    /// Returns the files of pair number `index` by extension: `json`, `png` and `txt`.
     fn files<'py>(
         &self,
         py: Python<'py>,
@@ -100,7 +100,7 @@ impl PySimulated {
         Ok(named)
     }
 
-    /// The pairs from `first` up to `end`: their images `[pairs, 1, rows, columns]`, and a list of the rest.
+    /// Returns the pairs from `first` up to `end`: images `[pairs, 1, rows, columns]`, and a list of all else by pair.
     fn pairs<'py>(
         &self,
         py: Python<'py>,
@@ -117,7 +117,7 @@ impl PySimulated {
         )
     }
 
-    /// Writes the first `count` pairs into a folder, or the share of a shard; `watch(done, total)` is called now and then.
+    /// Writes the first `count` pairs, or those of a shard, into a folder; calls `watch(done, total)` to report progress.
     #[expect(clippy::too_many_arguments, reason = "all are named in Python")]
     fn write(
         &self,
@@ -164,7 +164,7 @@ impl PySimulated {
     }
 }
 
-/// Values by their keys as assignments of a recipe.
+/// Converts values by key to assignments of a recipe.
 fn assignments(values: &Bound<'_, PyDict>) -> PyResult<Vec<String>> {
     let one = |(key, value): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
         let key: String = key.extract()?;
@@ -175,13 +175,13 @@ fn assignments(values: &Bound<'_, PyDict>) -> PyResult<Vec<String>> {
     values.iter().map(one).collect()
 }
 
-/// Calls the function that wants to know how far a set is.
+/// Calls the progress function, if there is one.
 fn told(watch: Option<&Py<PyAny>>, done: u64, total: u64) -> PyResult<()> {
     let Some(watch) = watch else { return Ok(()) };
     Python::attach(|py| watch.call1(py, (done, total)).map(drop))
 }
 
-/// Images of pairs as one array, and the rest of each.
+/// Returns the images of pairs as one array, and all else as a list.
 fn batch<'py>(
     py: Python<'py>,
     pairs: Vec<Pair>,
@@ -197,7 +197,7 @@ fn batch<'py>(
     Ok((images, items))
 }
 
-/// A pair as a dictionary.
+/// Converts a pair to a dictionary.
 fn item<'py>(py: Python<'py>, mut pair: Pair) -> PyResult<Bound<'py, PyDict>> {
     let image = Field {
         rows: pair.image.rows,
@@ -209,7 +209,8 @@ fn item<'py>(py: Python<'py>, mut pair: Pair) -> PyResult<Bound<'py, PyDict>> {
     Ok(item)
 }
 
-/// What is known of the image of a pair. Boxes count from the corner of the first pixel, in steps of 0.01, as in written data sets.
+/// Returns all of a pair but its image. Boxes count from the corner of the first pixel, in steps of 0.01 pixels, as in written
+/// data sets.
 fn about<'py>(py: Python<'py>, pair: &Pair) -> PyResult<Bound<'py, PyDict>> {
     let item = PyDict::new(py);
     item.set_item("index", pair.index)?;
@@ -220,7 +221,7 @@ fn about<'py>(py: Python<'py>, pair: &Pair) -> PyResult<Bound<'py, PyDict>> {
     for object in pair.labels.objects() {
         let [x, y, width, height] = object.box_px;
         let [width, height] = [width, height].map(|v| ((100.0 * v).round() / 100.0) as f32);
-        // As in written data sets, a sliver at the edge is no box.
+        // As in written data sets, boxes without width or height are dropped.
         if width > 0.0 && height > 0.0 {
             let [x, y] = [x, y].map(hundredths);
             boxes.extend([x, y, x + width, y + height]);
@@ -249,7 +250,7 @@ fn about<'py>(py: Python<'py>, pair: &Pair) -> PyResult<Bound<'py, PyDict>> {
     Ok(item)
 }
 
-/// Joins the shards of a folder; returns how many pairs it holds.
+/// Joins the shards of a folder; returns the number of pairs.
 #[pyfunction]
 fn merge_shards(py: Python<'_>, folder: PathBuf) -> PyResult<u64> {
     run(py, Some(1), || {

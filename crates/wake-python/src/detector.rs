@@ -1,4 +1,4 @@
-//! The detector: images and products to wakes.
+//! The detector: finds wakes in images and products.
 
 use crate::convert::json;
 use crate::error::{Fault, Outcome};
@@ -14,16 +14,16 @@ use wake_geo::{Land, Product};
 use wake_map::{Search, mapped, search};
 use wake_nn::burn::tensor::Device;
 
-/// No image has more pixels a side.
+/// Largest number of pixels along a side of an image.
 const LONGEST_SIDE: usize = 20_000;
 
-/// A trained network.
+/// Trained detector.
 #[pyclass(frozen, name = "Detector", module = "shipwake._core")]
 pub(crate) struct PyDetector(Detector);
 
 #[pymethods]
 impl PyDetector {
-    /// The network of this package, or that of a file.
+    /// Loads the detector of this package, or of a file.
     #[staticmethod]
     fn load(py: Python<'_>, file: Option<PathBuf>, threads: Option<usize>) -> PyResult<Self> {
         let detector = run(py, threads, || {
@@ -36,7 +36,7 @@ impl PyDetector {
         Ok(Self(detector))
     }
 
-    /// The wakes of an image of amplitudes or grey, the surest first.
+    /// Returns the wakes of an image of amplitudes or grey in descending order of score.
     fn find<'py>(
         &self,
         py: Python<'py>,
@@ -74,8 +74,8 @@ impl PyDetector {
         json(py, &found.iter().map(detection).collect::<Vec<_>>())
     }
 
-    /// The wakes of a product with their places, the surest first; land is left out with `buffer` metres of sea before it, or is
-    /// searched where `None`. The spacing is the product's, where no other is given.
+    /// Returns the wakes of a product with their places in descending order of score. Land and `buffer` metres of sea along it
+    /// are left out; `None` searches land, too. By default, the spacing is the product's.
     fn find_in<'py>(
         &self,
         py: Python<'py>,
@@ -103,7 +103,7 @@ impl PyDetector {
 }
 
 impl PyDetector {
-    /// The detector for pixels so far apart \[m\], and a least score.
+    /// Returns the detector for a pixel spacing \[m\] and a least score.
     fn with(&self, spacing: Option<f32>, least_score: f32) -> Outcome<Detector> {
         let detector = self.0.clone().with_least_score(least_score)?;
         Ok(match spacing {
@@ -113,7 +113,7 @@ impl PyDetector {
     }
 }
 
-/// The spacing that is given, or that of the pixels in the middle of a product \[m\].
+/// Returns the given spacing or, without one, the pixel spacing in the middle of the product \[m\].
 fn spacing_of(product: &Product, given: Option<f32>) -> Outcome<Option<f32>> {
     if given.is_some() || !product.has_places() {
         return Ok(given);
@@ -125,7 +125,7 @@ fn spacing_of(product: &Product, given: Option<f32>) -> Outcome<Option<f32>> {
     ))
 }
 
-/// Pixels in memory.
+/// An image in memory.
 struct Amplitudes {
     rows: usize,
     columns: usize,

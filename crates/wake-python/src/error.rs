@@ -1,4 +1,4 @@
-//! Errors of the libraries as Python exceptions, a class a kind; their texts are those of the libraries.
+//! Errors of the libraries as Python exceptions, one class per kind, with the texts of the libraries.
 
 use pyo3::PyErr;
 use std::any::Any;
@@ -27,15 +27,15 @@ use exceptions::{
     RecipeError, SceneError, TooLargeError, UnknownKeyError, WeightsError,
 };
 
-/// An exception on its way to Python; made without the interpreter's lock.
+/// A Python exception, which can be made without the interpreter's lock.
 #[derive(Debug)]
 pub(crate) struct Fault(pub(crate) PyErr);
 
-/// What fallible work returns.
+/// Result of fallible work.
 pub(crate) type Outcome<T> = Result<T, Fault>;
 
 impl Fault {
-    /// An argument that is no array of the shape and numbers that are asked for.
+    /// An array argument of the wrong shape or kind of numbers.
     pub(crate) fn array(text: String) -> Self {
         Self(ArrayError::new_err(text))
     }
@@ -50,7 +50,7 @@ impl Fault {
         Self(TooLargeError::new_err(text))
     }
 
-    /// A panic of a library: a defect.
+    /// A panic of a library, which is a defect.
     pub(crate) fn of_panic(panic: &(dyn Any + Send)) -> Self {
         let text = panic.downcast_ref::<String>().map(String::as_str);
         let text = text.or_else(|| panic.downcast_ref::<&str>().copied());

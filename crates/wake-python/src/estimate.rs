@@ -1,4 +1,4 @@
-//! Images to ship and wind.
+//! Estimates of ship and wind from images.
 
 use crate::convert::{array_of, array2, json};
 use crate::error::Fault;
@@ -10,7 +10,7 @@ use pyo3::types::{PyDict, PyList};
 use wake_physics::Field;
 use wake_physics::estimate::{Parameter, Priors, Sighting};
 
-/// Ship and wind of an image around a sighting: a dictionary.
+/// Estimates ship and wind from an image around a sighting, as a dictionary.
 #[pyfunction]
 #[pyo3(signature = (image, known, place, heading, deviations, calibrated, threads))]
 #[expect(clippy::too_many_arguments, reason = "all are named in Python")]
@@ -85,7 +85,7 @@ fn estimate<'py>(
     Ok(about)
 }
 
-/// Smallest standard deviations of unbiased estimates, by name.
+/// Returns the smallest standard deviations of unbiased estimates, by name.
 #[pyfunction]
 #[pyo3(signature = (scene, calibrated, threads))]
 fn bound<'py>(

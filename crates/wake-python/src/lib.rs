@@ -1,7 +1,7 @@
-//! The module `shipwake._core`: what the Python package `shipwake` calls. It is private, and changes with the package.
+//! The compiled module `shipwake._core` of the Python package `shipwake`. It is private, and changes with the package.
 //!
-//! Arrays and dictionaries go out, with keys as in the files of the libraries. Long calls release the interpreter's lock, work in a pool
-//! of their own, and turn panics into exceptions.
+//! Functions return arrays and dictionaries, with keys as in the files of the libraries. Long calls release the interpreter's
+//! lock, run on a thread pool of the module, and turn panics into exceptions.
 
 mod convert;
 mod dataset;
@@ -18,7 +18,7 @@ mod work;
 
 use pyo3::prelude::*;
 
-/// The private module of the package.
+/// Private compiled module of the package.
 #[pymodule(name = "_core")]
 fn core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;

@@ -1,4 +1,4 @@
-//! Satellite products and other rasters with places.
+//! Satellite products and other georeferenced rasters.
 
 use crate::convert::{array2, json};
 use crate::error::Fault;
@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use wake_geo::{Polarization, Product, Values};
 
-/// A product that is open.
+/// An open product.
 #[pyclass(frozen, name = "Product", module = "shipwake._core")]
 pub(crate) struct PyProduct(pub(crate) Arc<Product>);
 
@@ -35,12 +35,12 @@ impl PyProduct {
         Ok(Self(Arc::new(product)))
     }
 
-    /// Number of lines, and of pixels of a line.
+    /// Number of lines, and of pixels per line.
     fn shape(&self) -> (usize, usize) {
         self.0.size()
     }
 
-    /// Whether values are σ⁰.
+    /// Whether the values are σ⁰.
     fn is_calibrated(&self) -> bool {
         self.0.values() == Values::SigmaNought
     }
@@ -50,12 +50,12 @@ impl PyProduct {
         self.0.has_pixels()
     }
 
-    /// Whether places are known.
+    /// Whether the product is georeferenced.
     fn has_places(&self) -> bool {
         self.0.has_places()
     }
 
-    /// The values of a window.
+    /// Reads the values of a window.
     fn read<'py>(
         &self,
         py: Python<'py>,
@@ -68,27 +68,27 @@ impl PyProduct {
         array2(py, window.values, [window.lines, window.pixels])
     }
 
-    /// The place of a pixel.
+    /// Returns the place of a pixel.
     fn place<'py>(&self, py: Python<'py>, line: f64, pixel: f64) -> PyResult<Bound<'py, PyAny>> {
         json(py, &caught(|| Ok(self.0.place(line, pixel)?))?)
     }
 
-    /// Line and pixel of a place.
+    /// Returns line and pixel of a place.
     fn pixel_of(&self, latitude: f64, longitude: f64) -> PyResult<Option<(f64, f64)>> {
         Ok(caught(|| Ok(self.0.pixel_of(latitude, longitude)))?)
     }
 
-    /// Directions and sizes of the pixels around a place.
+    /// Returns directions and spacings of lines and pixels around a pixel.
     fn axes<'py>(&self, py: Python<'py>, line: f64, pixel: f64) -> PyResult<Bound<'py, PyAny>> {
         json(py, &caught(|| Ok(self.0.axes(line, pixel)?))?)
     }
 
-    /// Range over platform speed at a pixel \[s\].
+    /// Ratio of slant range and platform speed at a pixel \[s\].
     fn range_to_velocity(&self, line: f64, pixel: f64) -> PyResult<Option<f64>> {
         Ok(caught(|| Ok(self.0.range_to_velocity(line, pixel)?))?)
     }
 
-    /// Everything about one pixel.
+    /// Returns place, calibration and σ⁰ of a pixel.
     fn locate<'py>(
         &self,
         py: Python<'py>,

@@ -1,4 +1,4 @@
-//! The small model: sentences and scenes to images.
+//! The small diffusion model: images from sentences and scenes.
 
 use crate::convert::{array_of, check_memory, json};
 use crate::error::Fault;
@@ -11,13 +11,13 @@ use wake_ldm::WakeSampler;
 use wake_ldm::sampler::{PromptMode, WakeImage};
 use wake_nn::burn::tensor::Device;
 
-/// A model that draws images.
+/// Model that generates images.
 #[pyclass(frozen, name = "Sampler", module = "shipwake._core")]
 pub(crate) struct PySampler(WakeSampler);
 
 #[pymethods]
 impl PySampler {
-    /// The model of this package, or that of a folder.
+    /// Loads the model of this package, or of a folder.
     #[staticmethod]
     fn load(
         py: Python<'_>,
@@ -46,12 +46,12 @@ impl PySampler {
         Ok(Self(sampler))
     }
 
-    /// The scene that prompts leave open.
+    /// Scene whose values are used where a prompt states none.
     fn base_scene(&self) -> PyScene {
         PyScene(self.0.base_scene())
     }
 
-    /// An image of each prompt; image k has the seed `seed + k`.
+    /// Generates an image of each prompt; image k has the seed `seed + k`.
     fn prompts<'py>(
         &self,
         py: Python<'py>,
@@ -67,7 +67,7 @@ impl PySampler {
         all(py, images)
     }
 
-    /// An image of each scene, with its own seed.
+    /// Generates an image of each scene, with the scene's seed.
     fn scenes<'py>(
         &self,
         py: Python<'py>,
@@ -81,7 +81,7 @@ impl PySampler {
 }
 
 impl PySampler {
-    /// Checks that images of a batch fit; the network holds some hundred numbers for each pixel.
+    /// Checks that a batch fits in memory; the network holds some hundred numbers per pixel.
     fn check(&self, count: usize) -> PyResult<()> {
         let grid = self.0.base_scene().grid;
         Ok(check_memory(

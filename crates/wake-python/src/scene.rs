@@ -28,14 +28,14 @@ impl PyScene {
         Ok(caught(|| Ok(wake_physics::Scene::read(&path)?)).map(Self)?)
     }
 
-    /// The scene of tables, named as in a scene file.
+    /// Returns the scene of tables with the keys of a scene file.
     #[staticmethod]
     fn from_tables(tables: &Bound<'_, PyDict>) -> PyResult<Self> {
         let tables = toml_of("scene", tables)?.unwrap_or_else(|| toml::Table::new().into());
         Self::from_toml(&text_of(&tables)?)
     }
 
-    /// The scene that a prompt states; what it leaves open is that of `base`. With it what was not understood.
+    /// Returns the scene that a prompt states, completed by `base`, and the words that were not understood.
     #[staticmethod]
     fn from_prompt(prompt: &str, base: &Self) -> PyResult<(Self, Vec<String>)> {
         let read = || -> Outcome<_> {
@@ -51,17 +51,17 @@ impl PyScene {
         Ok(caught(read)?)
     }
 
-    /// The text of a scene file.
+    /// Returns the scene as the text of a scene file.
     fn to_toml(&self) -> PyResult<String> {
         Ok(caught(|| Ok(self.0.to_toml()?))?)
     }
 
-    /// The tables of a scene file.
+    /// Returns the scene as the tables of a scene file.
     fn to_tables<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         python_of_toml(py, &self.tables()?)
     }
 
-    /// The scene with other values, by keys such as `ship.speed`.
+    /// Returns the scene with other values, by keys such as `ship.speed`.
     fn with_values(&self, values: &Bound<'_, PyDict>) -> PyResult<Self> {
         let mut assignments = Vec::new();
         for (key, value) in values.iter() {
@@ -77,29 +77,29 @@ impl PyScene {
         Ok(caught(|| Ok(self.0.with_assignments(&assignments)?)).map(Self)?)
     }
 
-    /// The scene in words; the wordings count from 0.
+    /// Returns the scene in words; wordings count from 0.
     fn prompt(&self, wording: usize) -> PyResult<String> {
         let wording = Wording::ALL.get(wording).copied().unwrap_or_default();
         Ok(caught(|| Ok(wording.prompt(&self.0)?))?)
     }
 
-    /// Labels of the image, without making it.
+    /// Returns the labels of the image without simulating it.
     fn labels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         labels(py, &caught(|| Ok(labels_of(&self.0)))?)
     }
 
-    /// The plan of a simulation, without making it.
+    /// Returns the plan of the simulation without running it.
     fn plan<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         plan(py, &caught(|| Ok(Plan::new(&self.0)?))?)
     }
 
-    /// Rows, columns, and the spacing of pixels \[m\].
+    /// Rows, columns, and pixel spacing \[m\].
     fn grid(&self) -> (usize, usize, f64) {
         let grid = &self.0.grid;
         (grid.rows, grid.columns, grid.spacing)
     }
 
-    /// Whether two scenes are the same in every value.
+    /// Whether all values of two scenes are equal.
     fn equals(&self, other: &Self) -> bool {
         self.0 == other.0
     }
@@ -118,7 +118,7 @@ fn text_of(tables: &toml::Value) -> PyResult<String> {
     toml::to_string(tables).map_err(|error| SceneError::new_err(error.to_string()))
 }
 
-/// A prompt from which no scene follows.
+/// Error of a prompt that states nothing of a scene.
 fn nothing_stated(prompt: &str) -> Fault {
     Fault(crate::error::exceptions::PromptError::new_err(format!(
         "the prompt '{}' states nothing of a scene; say, for example, whether there is a ship, its speed and heading, the \
@@ -127,7 +127,7 @@ fn nothing_stated(prompt: &str) -> Fault {
     )))
 }
 
-/// Labels, and the objects that a detector is to find.
+/// Converts labels to a dictionary, with the objects that a detector should find.
 pub(crate) fn labels<'py>(
     py: Python<'py>,
     labels: &wake_physics::Labels,
@@ -151,7 +151,7 @@ pub(crate) fn labels<'py>(
     Ok(all)
 }
 
-/// A plan: its terms, sizes, notes, cost and text.
+/// Converts a plan to a dictionary of its terms, sizes, notes, cost and text.
 pub(crate) fn plan<'py>(py: Python<'py>, plan: &Plan) -> PyResult<Bound<'py, PyAny>> {
     let cost = plan.cost();
     let value = serde_json::json!({

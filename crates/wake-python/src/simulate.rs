@@ -1,4 +1,4 @@
-//! Scenes to images.
+//! Simulation of images from scenes.
 
 use crate::convert::{array_of, check_memory, json};
 use crate::error::{Fault, Outcome};
@@ -17,10 +17,10 @@ use wake_physics::grey::{GreyScale, Mapping};
 use wake_physics::output::encode_png;
 use wake_physics::{Method, Scene, Simulator};
 
-/// Images that are made between two looks at whether the user wants to stop, for each thread.
+/// Images per thread between two checks for an interrupt by the user.
 const BETWEEN_LOOKS: usize = 8;
 
-/// Simulates a scene: a dictionary of its fields, and one of what else is known.
+/// Simulates a scene; returns a dictionary of the fields, and one of labels, plan and other results.
 #[pyfunction]
 #[pyo3(signature = (scene, threads, direct))]
 fn simulate<'py>(
@@ -64,7 +64,7 @@ fn simulate<'py>(
     Ok((fields, about))
 }
 
-/// The mean over all seas of the intensity of a scene.
+/// Returns the mean over all seas of the intensity of a scene.
 #[pyfunction]
 #[pyo3(signature = (scene, threads))]
 fn expected_intensity<'py>(
@@ -78,7 +78,7 @@ fn expected_intensity<'py>(
     array_of(py, field)
 }
 
-/// Images of a base scene with other values: row i of `theta` holds those of `keys` for image number `first + i`.
+/// Simulates a base scene with other values: row i of `theta` holds the values of `keys` for image number `first + i`.
 #[pyfunction]
 #[pyo3(signature = (base, keys, theta, seed, first, speckle, threads))]
 #[expect(clippy::too_many_arguments, reason = "all are named in Python")]
@@ -121,7 +121,7 @@ fn rayon_threads() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Simulators that wait for the next image, each with its memory.
+/// Idle simulators, which keep their memory for the next image.
 #[derive(Default)]
 struct Idle(Mutex<Vec<Simulator>>);
 
@@ -136,7 +136,7 @@ impl Idle {
     }
 }
 
-/// The images of some scenes of one size, one after the other in `out`.
+/// Simulates scenes of equal size into `out`, one after the other.
 fn images(scenes: &[Scene], out: &mut [f32], speckle: bool, idle: &Idle) -> Outcome<()> {
     let pixels = out.len() / scenes.len().max(1);
     let places = out.par_chunks_mut(pixels.max(1)).zip(scenes);
@@ -152,7 +152,7 @@ fn images(scenes: &[Scene], out: &mut [f32], speckle: bool, idle: &Idle) -> Outc
     })
 }
 
-/// Number `first + i` of a seed has the values of row i, and the seed of scene `first + i` of a data set of that seed.
+/// Returns the scenes of a batch: scene i has the values of row i, and the seed of scene `first + i` of a data set of `seed`.
 fn scenes(
     base: &Scene,
     keys: &[String],
@@ -182,7 +182,7 @@ fn scenes(
     (0..).zip(theta.rows()).map(one).collect()
 }
 
-/// A number as TOML; whole ones also suit keys of whole numbers.
+/// Formats a number as TOML; whole numbers are integers, which every key of a number accepts.
 fn literal(value: f64) -> String {
     match value.fract() == 0.0 && value.abs() < (1u64 << 53) as f64 {
         true => format!("{value:.0}"),
@@ -190,7 +190,7 @@ fn literal(value: f64) -> String {
     }
 }
 
-/// σ⁰ or intensities as levels of 8 bits.
+/// Converts σ⁰ or intensities to 8-bit grey levels.
 #[pyfunction]
 fn levels<'py>(
     py: Python<'py>,
@@ -215,7 +215,7 @@ fn levels<'py>(
     crate::convert::array2(py, levels, [view.nrows(), view.ncols()])
 }
 
-/// An image of 8 bits as the bytes of a PNG file.
+/// Encodes an 8-bit image as the bytes of a PNG file.
 #[pyfunction]
 fn png<'py>(py: Python<'py>, levels: PyReadonlyArray2<'py, u8>) -> PyResult<Bound<'py, PyBytes>> {
     let view = levels.as_array();

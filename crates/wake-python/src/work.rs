@@ -1,4 +1,4 @@
-//! Long calls: without the interpreter's lock, on a pool of this process, with panics as exceptions.
+//! Long calls: run without the interpreter's lock on a thread pool of this process, with panics as exceptions.
 
 use crate::error::{Fault, Outcome};
 use pyo3::prelude::*;
@@ -6,10 +6,10 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// No pool has more threads.
+/// Largest number of threads in a pool.
 const MOST_THREADS: usize = 1024;
 
-/// The pools that one process made.
+/// Thread pools of one process.
 struct Pools {
     process: u32,
     pools: Vec<Arc<ThreadPool>>,
@@ -20,10 +20,10 @@ static POOLS: Mutex<Pools> = Mutex::new(Pools {
     pools: Vec::new(),
 });
 
-/// A pool of that many threads, one for each core where `None`, made once a process.
+/// Returns a pool of `threads` threads, by default one per core; each process makes it once.
 ///
-/// Called with the interpreter's lock, which a fork holds too: no child inherits the mutex locked. Of the pools that it inherits the
-/// threads do not exist; they are forgotten, since to drop them would speak to their threads.
+/// The caller holds the interpreter's lock, as does a fork, so no child inherits a locked mutex. The threads of inherited pools
+/// do not exist in the child; such pools are forgotten, since dropping them would signal their threads.
 fn pool(_: Python<'_>, threads: Option<usize>) -> Outcome<Arc<ThreadPool>> {
     let threads = match threads {
         None => std::thread::available_parallelism().map_or(1, usize::from),
@@ -55,7 +55,7 @@ fn pool(_: Python<'_>, threads: Option<usize>) -> Outcome<Arc<ThreadPool>> {
     Ok(pool)
 }
 
-/// Runs work on a pool of `threads` threads, while other threads of Python go on.
+/// Runs work on a pool of `threads` threads, while other Python threads continue.
 pub(crate) fn run<T: Send>(
     py: Python<'_>,
     threads: Option<usize>,
@@ -65,7 +65,7 @@ pub(crate) fn run<T: Send>(
     Ok(py.detach(|| caught(|| pool.install(work)))?)
 }
 
-/// Runs short work, with its panics as exceptions.
+/// Runs short work and turns its panics into exceptions.
 pub(crate) fn caught<T>(work: impl FnOnce() -> Outcome<T>) -> Outcome<T> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(Fault::of_panic(&*panic)))
 }

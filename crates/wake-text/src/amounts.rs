@@ -3,7 +3,7 @@
 use crate::pieces::{Kind, Piece, word_at};
 use std::ops::Range;
 
-/// What a unit measures.
+/// Quantity that a unit measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Dimension {
     Speed,
@@ -14,27 +14,27 @@ pub(crate) enum Dimension {
 /// A number with its unit.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Amount {
-    /// `None`: without a unit.
+    /// `None` without a unit.
     pub(crate) dimension: Option<Dimension>,
-    /// In m/s, degrees or metres; not a number for digits that are none.
+    /// Value in m/s, degrees or metres; NaN for digits that do not form a number.
     pub(crate) value: f64,
-    /// Index of the number and of the first piece after the unit.
+    /// Indices of the number and its unit.
     pub(crate) pieces: Range<usize>,
 }
 
-/// What a group of numbers comes to.
+/// Result of reading a group of numbers.
 #[derive(Debug, PartialEq)]
 pub(crate) enum Group {
-    /// One number; what follows up to the end, such as "± 1 m/s", is not a part of it.
+    /// One number. What follows it up to the given end, such as "± 1 m/s", is not part of it.
     One(Amount, usize),
-    /// A range, a list, a bound or a number without a unit: no value, up to the end.
+    /// A range, a list, a bound or a number without a unit, up to the given end: no value.
     NoValue(usize),
 }
 
-/// The group of numbers that starts at a piece, if one does.
+/// The group of numbers that starts at a piece, if there is one.
 ///
-/// "5 to 7 m/s", "5 m/s - 7 m/s", "between 5 and 7 m/s", "5 x 7 m" and "5 7 m/s" are ranges and lists; "at least
-/// 5 m/s" is a bound; "5 ± 1 m/s" is 5 m/s and more.
+/// "5 to 7 m/s", "5 m/s - 7 m/s", "between 5 and 7 m/s", "5 x 7 m" and "5 7 m/s" are ranges and lists; "at least 5
+/// m/s" is a bound; "5 ± 1 m/s" is 5 m/s with a margin.
 pub(crate) fn group(sentence: &[Piece<'_>], at: usize) -> Option<Group> {
     let mut first = amount(sentence, at)?;
     let mut end = first.pieces.end;
@@ -64,7 +64,7 @@ pub(crate) fn group(sentence: &[Piece<'_>], at: usize) -> Option<Group> {
     })
 }
 
-/// The number that a number before is one group with, and whether it is a margin of error.
+/// The next number of the group that `first` begins, and whether it is a margin of error.
 fn joined(sentence: &[Piece<'_>], first: &Amount, end: usize) -> Option<(Amount, bool)> {
     let kind = sentence.get(end)?.kind;
     let start = first.pieces.start;
@@ -120,7 +120,7 @@ fn is_bound(sentence: &[Piece<'_>], at: usize) -> bool {
     }
 }
 
-/// The number at a piece with its unit, if it is one.
+/// The number at a piece, if there is one, with its unit.
 fn amount(sentence: &[Piece<'_>], at: usize) -> Option<Amount> {
     let number = match sentence.get(at)?.kind {
         Kind::Number(number) => number,
@@ -134,7 +134,7 @@ fn amount(sentence: &[Piece<'_>], at: usize) -> Option<Amount> {
     let (dimension, factor, words) =
         unit.map_or((None, 1.0, 0), |u| (Some(u.dimension), u.factor, u.words));
     let value = number * factor + 0.0; // +0.0: never −0
-    // "45 100 degrees" and "5,270 degrees" are lists whose marks look like those of thousands.
+    // "45 100 degrees" and "5,270 degrees" are lists that look like numbers with thousands separators.
     let is_list = dimension == Some(Dimension::Angle) && (1000.0..f64::INFINITY).contains(&value);
     Some(Amount {
         dimension,
@@ -143,14 +143,14 @@ fn amount(sentence: &[Piece<'_>], at: usize) -> Option<Amount> {
     })
 }
 
-/// A unit: what it measures, its size in SI, its words.
+/// A unit: quantity, size in SI units (degrees for angles), number of words.
 struct Unit {
     dimension: Dimension,
     factor: f64,
     words: usize,
 }
 
-/// The unit that starts at a piece, if one does.
+/// The unit that starts at a piece, if there is one.
 fn unit(sentence: &[Piece<'_>], at: usize) -> Option<Unit> {
     let word = |i: usize| word_at(sentence, at + i).unwrap_or_default();
     let of = |dimension, factor, words| {
@@ -197,7 +197,7 @@ const MILE: f64 = 1609.344;
 const FOOT: f64 = 0.3048;
 const HOUR: f64 = 3600.0;
 
-/// A unit of speed in one word, in m/s.
+/// Size of a one-word unit of speed \[m/s\].
 fn speed_unit(word: &str) -> Option<f64> {
     Some(match word {
         "mps" => 1.0,
@@ -212,7 +212,7 @@ fn speed_unit(word: &str) -> Option<f64> {
     })
 }
 
-/// A unit of length, in metres.
+/// Size of a unit of length \[m\].
 fn length_unit(word: &str) -> Option<f64> {
     Some(match word {
         "m" | "meter" | "meters" | "metre" | "metres" => 1.0,
@@ -226,7 +226,7 @@ fn length_unit(word: &str) -> Option<f64> {
     })
 }
 
-/// A unit of time, in seconds.
+/// Size of a unit of time \[s\].
 fn time_unit(word: &str) -> Option<f64> {
     Some(match word {
         "s" | "sec" | "second" | "seconds" => 1.0,
@@ -236,7 +236,7 @@ fn time_unit(word: &str) -> Option<f64> {
     })
 }
 
-/// A unit of angle, in degrees.
+/// Size of a unit of angle \[degrees\].
 fn angle_unit(word: &str) -> Option<f64> {
     Some(match word {
         "deg" | "degs" | "degree" | "degrees" | "°" => 1.0,
@@ -245,7 +245,7 @@ fn angle_unit(word: &str) -> Option<f64> {
     })
 }
 
-/// Whether this word after "degrees" makes them a temperature, a position, a rate or an angle to something else.
+/// Whether this word after "degrees" marks a temperature, a position, a rate or an angle relative to something else.
 fn makes_no_direction(word: &str) -> bool {
     matches!(
         word,
@@ -297,7 +297,8 @@ mod tests {
         group(&pieces, at)
     }
 
-    /// International values: the nautical mile of 1,852 m (1929), the foot of 0.3048 m (1959), the mile of 5,280 feet.
+    /// International values: the nautical mile of 1,852 m (1929), the foot of 0.3048 m (1959), the mile of 5,280
+    /// feet.
     #[test]
     fn units_have_their_international_sizes() {
         use Dimension::{Angle, Length, Speed};
@@ -336,7 +337,7 @@ mod tests {
                 panic!("{text}");
             };
             assert_eq!(amount.dimension, Some(dimension), "{text}");
-            // One product and one quotient of numbers that are not exact: two half units in the last place.
+            // One product and one quotient of inexact numbers: two half units in the last place.
             assert!(
                 (amount.value - value).abs() <= 2.0 * f64::EPSILON * value,
                 "{text}: {}",

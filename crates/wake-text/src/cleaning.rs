@@ -1,4 +1,4 @@
-//! Cleaning of a prompt before it is split into words. The rules are in `cleaning.md`, shown at
+//! Cleans a prompt before it is split into words. The rules are in `cleaning.md`, shown at
 //! [`Tokenizer::encode`](crate::Tokenizer::encode).
 
 use std::ops::Range;
@@ -6,16 +6,16 @@ use unicode_normalization::{
     IsNormalized, UnicodeNormalization, char::canonical_combining_class, is_nfc_quick,
 };
 
-/// A cleaned prompt that remembers where its bytes came from.
+/// A cleaned prompt with the origin of each byte.
 #[derive(Debug)]
 pub(crate) struct Cleaned {
     pub(crate) text: String,
-    /// Byte in the prompt of each byte of `text`; `None`: the same.
+    /// Byte offset in the prompt of each byte of `text`; `None` if they are equal.
     origin: Option<Vec<usize>>,
 }
 
 impl Cleaned {
-    /// The byte offset in the prompt that the byte `at` of the text came from.
+    /// The byte offset in the prompt from which the byte `at` of the text came.
     pub(crate) fn origin(&self, at: usize) -> usize {
         match &self.origin {
             Some(origin) => origin.get(at).copied().unwrap_or(at),
@@ -25,7 +25,7 @@ impl Cleaned {
 }
 
 impl Cleaned {
-    /// The bytes of the prompt that a range of the text came from; never empty unless the range is.
+    /// The byte range of the prompt from which a range of the text came; empty only if the range is.
     pub(crate) fn span(&self, range: Range<usize>, prompt: &str) -> Range<usize> {
         let Some(last) = range.end.checked_sub(1).filter(|_| !range.is_empty()) else {
             return 0..0;
@@ -37,7 +37,7 @@ impl Cleaned {
     }
 }
 
-/// A character and the byte offset in the prompt that it came from.
+/// A character and its byte offset in the prompt.
 type Traced = (char, usize);
 
 /// Cleans a prompt by the rules of this module.
@@ -56,18 +56,18 @@ pub(crate) fn clean(prompt: &str) -> Cleaned {
     collect(lower(&traced))
 }
 
-/// Whether no rule but lower case changes this byte.
+/// Whether no rule changes this byte except lower case.
 fn is_plain(byte: u8) -> bool {
     matches!(byte, b' '..=b'%' | b'\''..=b'~' | b'\t' | b'\n' | b'\r' | b'\x0C')
 }
 
 /// Decodes HTML entities until none is left, from the right, so that `&amp;lt;` takes one pass.
 ///
-/// From the line of the first `<` on the text is markup, whose entities stay.
+/// From the line of the first `<` onward the text is markup, and its entities stay.
 fn decode_entities(prompt: &str) -> Vec<Traced> {
     let line_of = |at: usize| prompt[..at].rfind('\n').map_or(0, |end| end + 1);
     let markup = prompt.find('<').map_or(prompt.len(), line_of);
-    // The text so far, backwards: its last element is the leftmost character.
+    // The text so far, reversed: its last element is the leftmost character.
     let mut stack: Vec<Traced> = Vec::with_capacity(prompt.len());
     for (at, c) in prompt.char_indices().rev() {
         stack.push((c, at));
@@ -82,7 +82,7 @@ fn decode_entities(prompt: &str) -> Vec<Traced> {
     stack
 }
 
-/// The entity that starts with the leftmost character, if one does: its length and what it stands for.
+/// The entity that starts with the leftmost character, if there is one: its length and its replacement.
 fn entity_on_top(stack: &[Traced]) -> Option<(usize, String)> {
     const LONGEST: usize = 27; // '&', '#', 24 letters or digits, ';'
     if stack.last()?.0 != '&' {
@@ -99,7 +99,7 @@ fn entity_on_top(stack: &[Traced]) -> Option<(usize, String)> {
     (decoded != entity).then(|| (entity.len(), decoded.into_owned()))
 }
 
-/// What a C1 control character (U+0080 to U+009F) is in Windows-1252; five are nothing there.
+/// Reads a C1 control character (U+0080 to U+009F) as Windows-1252, where five are undefined.
 fn from_windows_1252(c: char) -> char {
     const MEANT: &str = "€\u{81}‚ƒ„…†‡ˆ‰Š‹Œ\u{8D}Ž\u{8F}\u{90}‘’“”•–—˜™š›œ\u{9D}žŸ";
     match u32::from(c) {
@@ -122,13 +122,13 @@ fn replace_forms(text: &[Traced]) -> Vec<Traced> {
     out
 }
 
-/// Latin ligatures and letter pairs, ideographic space, full and half width.
+/// Whether a character is a Latin ligature or letter pair, the ideographic space, or of full or half width.
 fn has_usual_form(c: char) -> bool {
     matches!(c, '\u{132}' | '\u{133}' | '\u{149}' | '\u{1C4}'..='\u{1CC}' | '\u{1F1}'..='\u{1F3}'
         | '\u{FB00}'..='\u{FB06}' | '\u{3000}' | '\u{FF01}'..='\u{FFEF}')
 }
 
-/// A curly quote straightened.
+/// Straightens a curly quote.
 fn straight(c: char) -> char {
     match c {
         '\u{2BC}' | '\u{2018}'..='\u{201B}' => '\'',
@@ -137,7 +137,7 @@ fn straight(c: char) -> char {
     }
 }
 
-/// Drops what sets colours in a terminal: escape, `[`, digits and semicolons, a letter.
+/// Removes terminal colour codes: escape, `[`, digits and semicolons, a letter.
 fn drop_terminal_codes(text: &[Traced]) -> Vec<Traced> {
     let mut out = Vec::with_capacity(text.len());
     let mut rest = text;
@@ -153,7 +153,7 @@ fn drop_terminal_codes(text: &[Traced]) -> Vec<Traced> {
     out
 }
 
-/// Length of the terminal code that a text starts with.
+/// Length of the terminal code at the start of a text.
 fn terminal_code(text: &[Traced]) -> Option<usize> {
     let [('\x1B', _), ('[', _), after @ ..] = text else {
         return None;
@@ -166,18 +166,18 @@ fn terminal_code(text: &[Traced]) -> Option<usize> {
     last.is_ascii_alphabetic().then_some(numbers + 3)
 }
 
-/// Control characters without a use in a prompt.
+/// Whether a control character has no use in a prompt.
 fn is_control(c: char) -> bool {
     matches!(c, '\0'..='\x08' | '\x0B' | '\x0E'..='\x1F' | '\x7F' | '\u{206A}'..='\u{206F}'
         | '\u{FEFF}' | '\u{FFF9}'..='\u{FFFC}')
 }
 
-/// Unicode form NFC; what is composed comes from where its first character came from.
+/// Composes to Unicode form NFC; a composed character has the origin of its first character.
 fn compose(text: &[Traced]) -> Vec<Traced> {
     if is_nfc_quick(text.iter().map(|&(c, _)| c)) == IsNormalized::Yes {
         return text.to_vec();
     }
-    // Between two such groups nothing is composed or reordered.
+    // Nothing is composed or reordered across the border of two groups.
     text.chunk_by(|_, &(next, _)| !starts_group(next))
         .flat_map(|group| {
             let at = group[0].1;
@@ -186,12 +186,12 @@ fn compose(text: &[Traced]) -> Vec<Traced> {
         .collect()
 }
 
-/// Whether this character never joins with what stands before it.
+/// Whether this character never combines with the one before it.
 fn starts_group(c: char) -> bool {
     canonical_combining_class(c) == 0 && is_nfc_quick(std::iter::once(c)) == IsNormalized::Yes
 }
 
-/// Lower case of the whole text: a final sigma depends on its neighbours.
+/// Converts the whole text to lower case at once, because a final sigma depends on its neighbours.
 fn lower(text: &[Traced]) -> impl Iterator<Item = Traced> {
     let whole: String = text.iter().map(|&(c, _)| c).collect();
     let lower: Vec<char> = whole.to_lowercase().chars().collect();
@@ -253,7 +253,7 @@ mod tests {
         let origins: Vec<usize> = (0..=cleaned.text.len())
             .map(|at| cleaned.origin(at))
             .collect();
-        // '&' 0, ' ' 5, the two bytes of 'é' 6, 'f' and 'i' 9, 'x' 12; past the end the number itself.
+        // '&' 0, ' ' 5, the two bytes of 'é' 6, 'f' and 'i' 9, 'x' 12; past the end, the offset itself.
         assert_eq!(origins, [0, 5, 6, 6, 9, 9, 12, 7]);
     }
 

@@ -3,7 +3,7 @@
 use crate::pieces::{Piece, word_at};
 use std::ops::Range;
 
-/// Degrees between two of the sixteen points.
+/// Angle between neighbouring points \[degrees\].
 pub(crate) const POINT: f64 = 22.5;
 
 /// The points clockwise from north, in words and in letters.
@@ -26,7 +26,7 @@ const POINTS: [(&str, &str); 16] = [
     ("northnorthwest", "nnw"),
 ];
 
-/// What the ending of a compass word says.
+/// Ending of a compass word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Form {
     /// "north", "NE".
@@ -48,16 +48,16 @@ const ENDINGS: [(&str, Form); 6] = [
     ("ern", Form::Ern),
 ];
 
-/// A compass word, perhaps in several pieces.
+/// A compass word, which may span several pieces.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Compass {
-    /// Clockwise from north.
+    /// Degrees clockwise from north.
     pub(crate) degrees: f64,
     pub(crate) form: Form,
     pub(crate) pieces: Range<usize>,
 }
 
-/// The longest compass word that starts at a piece: "north", "north-east", "nor-" is none.
+/// Longest compass word that starts at a piece, such as "north" or "north-east"; `None` for "nor-".
 pub(crate) fn compass(sentence: &[Piece<'_>], at: usize) -> Option<Compass> {
     let mut joined = String::new();
     let mut found = None;
@@ -82,7 +82,7 @@ pub(crate) fn compass(sentence: &[Piece<'_>], at: usize) -> Option<Compass> {
     found
 }
 
-/// Degrees and form of a compass word in one.
+/// Degrees and form of a compass word written as one word.
 fn read(word: &str) -> Option<(f64, Form)> {
     let ending = ENDINGS
         .iter()
@@ -94,12 +94,12 @@ fn read(word: &str) -> Option<(f64, Form)> {
     Some((POINT * rank as f64, form))
 }
 
-/// Whether a word or its letters may be a compass word.
+/// Whether a word or abbreviation may be a compass word.
 pub(crate) fn may_be_compass(word: &str) -> bool {
     read(word).is_some()
 }
 
-/// Whether a word is a compass word by itself; single letters are not.
+/// Whether a word is a compass word by itself; one or two letters are not.
 pub(crate) fn is_compass(word: &str) -> bool {
     word.len() > 2 && read(word).is_some()
 }

@@ -1,4 +1,4 @@
-//! What a sentence denies, and what it makes a condition.
+//! Negations and conditions of a sentence.
 
 use crate::compass::is_compass;
 use crate::pieces::{Kind, Piece, word_at};
@@ -7,22 +7,22 @@ use crate::subjects::{
 };
 use std::ops::Range;
 
-/// Something denied in a sentence.
+/// Something that a sentence denies.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Denied {
-    /// `None`: not understood.
+    /// `None` if not understood.
     pub(crate) subject: Option<Subject>,
     pub(crate) pieces: Range<usize>,
 }
 
-/// What a sentence denies, in its order.
+/// The negations of a sentence, in order.
 pub(crate) fn denials(sentence: &[Piece<'_>]) -> Vec<Denied> {
     let mut found: Vec<Denied> = Vec::new();
     let mut at = 0;
     while at < sentence.len() {
         match denial(sentence, at) {
             Some(mut denied) => {
-                // "almost no wind" is some.
+                // "almost no wind" is some wind.
                 if word_before(sentence, at).is_some_and(is_approximate) {
                     denied.subject = None;
                     denied.pieces.start = at - 1;
@@ -40,10 +40,10 @@ pub(crate) fn denials(sentence: &[Piece<'_>]) -> Vec<Denied> {
     found
 }
 
-/// Pieces that a denial reaches at most.
+/// Most pieces that a negation covers.
 const REACH: usize = 8;
 
-/// What is denied from a piece on.
+/// The negation or condition that starts at a piece, if there is one.
 fn denial(sentence: &[Piece<'_>], at: usize) -> Option<Denied> {
     let word = word_at(sentence, at);
     if word.is_some_and(opens_condition) {
@@ -75,7 +75,7 @@ fn denial(sentence: &[Piece<'_>], at: usize) -> Option<Denied> {
             understood = false;
             continue;
         };
-        // "no lack of ships", "not windless": denied twice.
+        // "no lack of ships", "not windless": double negation.
         understood &= !denies(word);
         match noun(word) {
             Some(subject) if subject != Subject::Heading && subject != Subject::Bystander => {
@@ -119,7 +119,7 @@ fn denial(sentence: &[Piece<'_>], at: usize) -> Option<Denied> {
     denied_nothing(sentence, at..sentence.len().min(start + REACH))
 }
 
-/// Whether what follows a denied noun takes the denial back: "not ship-free", "no ships but one".
+/// Whether the words after a denied noun cancel the negation: "not ship-free", "no ships but one".
 fn is_taken_back(sentence: &[Piece<'_>], at: usize, end: usize) -> bool {
     let counted = |at: usize| {
         sentence.get(at).is_some_and(|piece| {
@@ -135,7 +135,7 @@ fn is_taken_back(sentence: &[Piece<'_>], at: usize, end: usize) -> bool {
             && counted(end + 1))
 }
 
-/// Whether a word denies or tells of an absence.
+/// Whether a word negates or means absence.
 fn denies(word: &str) -> bool {
     matches!(
         word,
@@ -164,7 +164,7 @@ fn is_plain(word: &str) -> bool {
     says_nothing(word) || is_further(word) || matches!(word, "large" | "detectable" | "discernible")
 }
 
-/// Whether a word makes what follows, up to the next comma, a condition or an exception.
+/// Whether a word makes the text up to the next comma a condition or an exception.
 fn opens_condition(word: &str) -> bool {
     matches!(
         word,
@@ -180,7 +180,7 @@ fn opens_condition(word: &str) -> bool {
     )
 }
 
-/// A condition or an exception, up to the next comma: nothing of it is stated.
+/// A condition or an exception, up to the next comma, which states nothing.
 fn condition(sentence: &[Piece<'_>], at: usize) -> Denied {
     let ends = |piece: &Piece<'_>| matches!(piece.kind, Kind::Comma | Kind::Stop);
     let length = sentence[at..].iter().position(ends);
@@ -190,7 +190,7 @@ fn condition(sentence: &[Piece<'_>], at: usize) -> Denied {
     }
 }
 
-/// A denial of no subject, which matters where it denies numbers or directions.
+/// A negation without a subject, which matters only if it covers numbers, directions or other words of the field.
 fn denied_nothing(sentence: &[Piece<'_>], pieces: Range<usize>) -> Option<Denied> {
     let says = |at: usize| match sentence[at].kind {
         Kind::Number(_) | Kind::Figure => true,
@@ -203,7 +203,7 @@ fn denied_nothing(sentence: &[Piece<'_>], pieces: Range<usize>) -> Option<Denied
     })
 }
 
-/// Number of pieces of the denial that starts at a piece: "no", "free of".
+/// Number of pieces of the negation that starts at a piece: "no", "free of".
 fn opening(sentence: &[Piece<'_>], at: usize) -> Option<usize> {
     let word = word_at(sentence, at)?;
     let of = word_at(sentence, at + 1) == Some("of");
@@ -215,7 +215,7 @@ fn opening(sentence: &[Piece<'_>], at: usize) -> Option<usize> {
     }
 }
 
-/// Number of pieces of a noun and what denies it: "shipless", "ship-free", "ships: none", "ship is not visible".
+/// Number of pieces of a noun and its negation: "shipless", "ship-free", "ships: none", "ship is not visible".
 fn denied_after(sentence: &[Piece<'_>], at: usize) -> Option<usize> {
     if word_at(sentence, at)?.ends_with("less") {
         return Some(1);
@@ -240,7 +240,8 @@ fn denied_after(sentence: &[Piece<'_>], at: usize) -> Option<usize> {
     Some(last + 1 - at)
 }
 
-/// Number of pieces from a noun to a denial that other words keep from being understood: "ship is hardly ever absent".
+/// Number of pieces from a noun to a negation that is not understood because of other words: "ship is hardly ever
+/// absent".
 fn perhaps_denied_after(sentence: &[Piece<'_>], at: usize) -> Option<usize> {
     let mut not = false;
     for (end, piece) in sentence.iter().enumerate().skip(at + 1).take(REACH) {
@@ -261,7 +262,7 @@ fn perhaps_denied_after(sentence: &[Piece<'_>], at: usize) -> Option<usize> {
     None
 }
 
-/// Whether a word says that something is there.
+/// Whether a word means presence.
 fn is_presence(word: &str) -> bool {
     matches!(
         word,
@@ -269,7 +270,7 @@ fn is_presence(word: &str) -> bool {
     )
 }
 
-/// What "or" adds to a denial: "no wind or ship".
+/// The negation that "or" continues: "no wind or ship".
 fn further(sentence: &[Piece<'_>], at: usize) -> Option<Denied> {
     matches!(word_at(sentence, at)?, "or" | "nor").then_some(())?;
     let article = usize::from(word_at(sentence, at + 1).is_some_and(is_article));
@@ -288,7 +289,7 @@ fn further(sentence: &[Piece<'_>], at: usize) -> Option<Denied> {
     Some(Denied { subject, pieces })
 }
 
-/// Whether "no" before this word denies only more of the same.
+/// Whether "no" before this word denies only further instances.
 fn is_further(word: &str) -> bool {
     matches!(
         word,

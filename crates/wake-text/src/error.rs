@@ -1,4 +1,4 @@
-//! What can go wrong, by whose fault it is.
+//! Errors of this crate.
 
 use std::path::PathBuf;
 use whole_files::{quoted, sentence};
@@ -8,7 +8,7 @@ use whole_files::{quoted, sentence};
 #[expect(missing_docs, reason = "the message names every field")]
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {
-    /// The scene is not valid, so there is no prompt for it.
+    /// The scene is invalid, so it has no prompt.
     #[cfg(feature = "scene")]
     #[error(transparent)]
     Scene(#[from] wake_physics::Error),
@@ -55,7 +55,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 mod tests {
     use super::*;
 
-    /// What others wrote reaches a terminal in one short line without control characters.
+    /// Untrusted text reaches a terminal as one short line without control characters.
     #[test]
     fn foreign_text_is_escaped_and_cut() {
         let foreign = format!("\u{1b}[31m\0\u{7}\n{}", "x".repeat(100_000));

@@ -1,7 +1,7 @@
 //! Filler: words that change no value of a scene.
 //!
-//! A word that is neither here nor in another room's vocabulary is unknown, and a reading names it as unread. A word
-//! belongs here only if no value can mean anything else with it than without it.
+//! A word that is neither listed here nor in the vocabulary of another module is unknown and reported as unread. List
+//! a word here only if it never changes the meaning of a value.
 
 /// Articles, pronouns and forms of "be" and "have".
 const GRAMMAR: [&str; 29] = [
@@ -17,7 +17,7 @@ const JOINTS: [&str; 29] = [
     "via", "upon", "where", "so", "also",
 ];
 
-/// Words of images and of how they come about.
+/// Words about images and how they are made.
 const PICTURES: [&str; 52] = [
     "image",
     "images",
@@ -73,7 +73,7 @@ const PICTURES: [&str; 52] = [
     "present",
 ];
 
-/// Words of the sea, and verbs of what ships, wind and waves do at any speed.
+/// Words about the sea, and verbs that ships, wind and waves take at any speed.
 const SEA: [&str; 47] = [
     "sea",
     "seas",

@@ -1,4 +1,4 @@
-//! What of a sentence was not taken in.
+//! Parts of a sentence that were not read.
 
 use crate::amounts::is_unit;
 use crate::compass::is_compass;
@@ -9,20 +9,20 @@ use crate::subjects::{
 };
 use std::ops::Range;
 
-/// Whether a piece has been taken in.
+/// State of a piece.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Mark {
     Open,
     Used,
     Unread,
-    /// Says that there is no wake: used where there is no ship.
+    /// Denies the wake: counts as used if there is no ship.
     NoWake,
 }
 
-/// A part of a sentence that was not taken in.
+/// A part of a sentence that was not read.
 pub(crate) struct Left {
     pub(crate) place: Range<usize>,
-    /// Whether it has a number or a word of the field.
+    /// Whether it contains a number or a word of the field.
     pub(crate) of_the_field: bool,
 }
 
@@ -30,12 +30,12 @@ pub(crate) struct Left {
 pub(crate) struct Marked<'s, 'a> {
     pub(crate) pieces: &'s [Piece<'a>],
     pub(crate) marks: &'s [Mark],
-    /// What it names, less what it denies.
+    /// Subjects that the sentence names and does not deny.
     pub(crate) subjects: &'s [Named],
 }
 
 impl Marked<'_, '_> {
-    /// What was not taken in; neighbours are one.
+    /// Unread parts; neighbouring pieces are merged.
     pub(crate) fn left(&self, scene: &PartialScene) -> Vec<Left> {
         let mut found: Vec<Left> = Vec::new();
         let mut last = usize::MAX;
@@ -60,7 +60,7 @@ impl Marked<'_, '_> {
         found
     }
 
-    /// Whether a piece is a sign or a word that no room knows, or tells how much of what no number states.
+    /// Whether a piece is a sign or an unknown word, or a strength ("light") whose value no number states.
     fn is_unknown(&self, at: usize, scene: &PartialScene) -> bool {
         let word = match (self.marks[at], self.pieces[at].kind) {
             (Mark::Open, Kind::Symbol | Kind::Bound) => return true,
@@ -82,7 +82,7 @@ impl Marked<'_, '_> {
         noun(word).is_none() && !is_attribute(word) && !says_nothing(word)
     }
 
-    /// The subject whose strength the word at a place tells: the next one nearby, else the last one.
+    /// The subject to which the strength at a place refers: the next one nearby, else the last one.
     fn strong(&self, at: usize) -> Option<Subject> {
         let next = self.subjects.partition_point(|named| named.at < at);
         let (before, after) = self.subjects.split_at(next);

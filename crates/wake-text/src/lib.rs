@@ -6,7 +6,7 @@
 
 mod error;
 
-// Scene → prompt → what it states.
+// Scene → prompt → stated values.
 mod cleaning;
 #[cfg(feature = "scene")]
 mod numbers;

@@ -1,7 +1,7 @@
 //! Words that change the number beside them: comparisons, fractions, multiples, reversals, relative bearings.
 //!
-//! None of them is computed. Whatever they change is unread, together with the word. An unknown word that stands right
-//! before a number, or is bound to it by "of", "to" or a colon, may be one of them and counts as one.
+//! None of them is evaluated: the value they change stays unread, together with the word. An unknown word right
+//! before a number, or bound to it by "of", "to" or a colon, may be a modifier and is treated as one.
 
 use crate::amounts::is_unit;
 use crate::compass::may_be_compass;
@@ -10,18 +10,18 @@ use crate::subjects::{
     is_at_rest, is_attribute, is_filler, is_motion, is_strength, noun, says_nothing, word_before,
 };
 
-/// Pieces before a number among which a modifier is sought.
+/// Number of pieces before or after a quantity that are searched for a modifier.
 const REACH: usize = 8;
 
-/// Index of the first piece before a quantity that changes it, if one does.
+/// Index of the first piece of a modifier before a quantity, if there is one.
 ///
-/// `unknown_binds`: whether an unknown word right before it counts.
+/// - `unknown_binds`: whether an unknown word right before the quantity counts as a modifier
 pub(crate) fn modifier_before(
     sentence: &[Piece<'_>],
     start: usize,
     unknown_binds: bool,
 ) -> Option<usize> {
-    // Whether only words stand between that bind what is before them to the quantity.
+    // Whether all words so far bind the word before them to the quantity.
     let mut bound = unknown_binds;
     for at in (start.saturating_sub(REACH)..start).rev() {
         let word = match sentence[at].kind {
@@ -53,7 +53,7 @@ pub(crate) fn modifier_before(
     None
 }
 
-/// Whether the word at a place changes the quantity that starts at another.
+/// Whether the word at `at` changes the quantity that starts at `start`.
 fn changes(sentence: &[Piece<'_>], at: usize, start: usize) -> bool {
     let after_quantity = || {
         at > 0
@@ -71,7 +71,8 @@ fn changes(sentence: &[Piece<'_>], at: usize, start: usize) -> bool {
     }
 }
 
-/// Index after the last piece behind a quantity that changes it, if one does; `turns`: whether it may be an angle.
+/// Index after the last piece of a modifier behind a quantity, if there is one; `turns`: whether the quantity may be
+/// an angle.
 pub(crate) fn modifier_after(sentence: &[Piece<'_>], end: usize, turns: bool) -> Option<usize> {
     let next = sentence.get(end)?;
     let touches = end > 0 && sentence[end - 1].place.end == next.place.start;
@@ -92,7 +93,7 @@ pub(crate) fn modifier_after(sentence: &[Piece<'_>], end: usize, turns: bool) ->
     found
 }
 
-/// Whether a word has a meaning to the reader of prompts, if only that of filler.
+/// Whether a word is in any vocabulary, including filler.
 fn is_known(word: &str) -> bool {
     says_nothing(word)
         || noun(word).is_some()
@@ -103,7 +104,7 @@ fn is_known(word: &str) -> bool {
         || may_be_compass(word)
 }
 
-/// Whether a word may stand between a quantity and what changes it.
+/// Whether a word may stand between a quantity and its modifier.
 fn joins(word: &str) -> bool {
     matches!(
         word,
@@ -111,7 +112,7 @@ fn joins(word: &str) -> bool {
     )
 }
 
-/// Whether a word makes a number a bound or a part of another.
+/// Whether a word makes a number a bound or a fraction of another.
 fn compares(word: &str) -> bool {
     COMPARISONS.contains(&word)
 }
@@ -154,7 +155,7 @@ const COMPARISONS: [&str; 35] = [
     "respectively",
 ];
 
-/// Words that change what follows.
+/// Words that change the quantity after them.
 const BEFORE: [&str; 44] = [
     "up",
     "between",
@@ -202,13 +203,13 @@ const BEFORE: [&str; 44] = [
     "away",
 ];
 
-/// Words that change what stands before them.
+/// Words that change the quantity before them.
 const AFTER: [&str; 14] = [
     "short", "shy", "tops", "minus", "squared", "cubed", "per", "apart", "halved", "doubled",
     "tripled", "reversed", "inverted", "either",
 ];
 
-/// Words that make degrees an angle to something other than north.
+/// Words that make degrees an angle relative to something other than north.
 const RELATIVE: [&str; 27] = [
     "port",
     "starboard",
@@ -239,7 +240,7 @@ const RELATIVE: [&str; 27] = [
     "magnetic",
 ];
 
-/// Words between a quantity and what changes it from behind.
+/// Words between a quantity and a modifier behind it.
 const BRIDGES: [&str; 12] = [
     "to", "on", "of", "from", "the", "its", "a", "an", "your", "or", "at", "in",
 ];

@@ -1,7 +1,7 @@
 //! Numbers at the start of a text, in digits and in words.
 
-/// Value and length of `12`, `1,200`, `12 000`, `1.5`, `1,5`, `.5`, `1.5e3`, `1/2`, `8 1/2` or `8½`; not a
-/// number for digits that are joined in another way.
+/// Value and length of `12`, `1,200`, `12 000`, `1.5`, `1,5`, `.5`, `1.5e3`, `1/2`, `8 1/2` or `8½`; NaN for digits
+/// joined in any other way.
 pub(crate) fn unsigned(text: &str) -> Option<(f64, usize)> {
     let (whole, mut length) = match decimal(text) {
         Some(read) => read,
@@ -31,7 +31,7 @@ pub(crate) fn unsigned(text: &str) -> Option<(f64, usize)> {
 fn decimal(text: &str) -> Option<(f64, usize)> {
     let bytes = text.as_bytes();
     let digit = |at: usize| bytes.get(at).is_some_and(u8::is_ascii_digit);
-    // `.5` is a number, `,5` a comma and a number.
+    // `.5` is a number; `,5` is a comma and a number.
     let mut length = usize::from(bytes.first() == Some(&b'.') && digit(1));
     while digit(length)
         || (length > 0 && matches!(bytes.get(length), Some(b'.' | b',')) && digit(length + 1))
@@ -65,7 +65,7 @@ fn spaced_group(text: &str) -> Option<usize> {
     is_group.then(|| space.len_utf8() + 3)
 }
 
-/// Digits as Rust writes them: commas between groups of three go, a single other comma is a decimal point.
+/// Digits in Rust's notation: commas between groups of three are removed; any other single comma is a decimal point.
 fn plain_number(number: &str) -> Option<String> {
     let (whole, decimals) = number.split_once('.').unwrap_or((number, ""));
     let groups: Vec<&str> = whole.split(',').collect();
@@ -93,12 +93,12 @@ fn exponent_length(text: &[u8]) -> usize {
     }
 }
 
-/// Number of digits that a text starts with.
+/// Number of digits at the start of a text.
 pub(crate) fn digits(text: &[u8]) -> usize {
     text.iter().take_while(|byte| byte.is_ascii_digit()).count()
 }
 
-/// `1/2` and other halves, quarters and eighths; other digits with slashes, such as dates, are no number.
+/// Reads `1/2` and other halves, thirds, quarters and eighths; any other digits with slashes, such as dates, are NaN.
 fn slashed(text: &str) -> Option<(f64, usize)> {
     let length = text.find(|c: char| !(c.is_ascii_digit() || matches!(c, '/' | '\u{2044}')));
     let all = &text[..length.unwrap_or(text.len())];
@@ -116,7 +116,7 @@ fn slashed(text: &str) -> Option<(f64, usize)> {
     Some((value, all.len()))
 }
 
-/// A fraction below one right after a whole number, or after one space.
+/// Reads a fraction below one right after a whole number, or after a space or hyphen.
 fn fraction_after(text: &str) -> Option<(f64, usize)> {
     let space = usize::from(text.starts_with([' ', '-']));
     let (value, length) =
@@ -124,7 +124,7 @@ fn fraction_after(text: &str) -> Option<(f64, usize)> {
     (value < 1.0).then_some((value, space + length))
 }
 
-/// `½` and its like.
+/// Reads `½` and similar characters.
 fn vulgar(text: &str) -> Option<(f64, usize)> {
     let c = text.chars().next()?;
     let eighths = [
@@ -140,7 +140,7 @@ fn vulgar(text: &str) -> Option<(f64, usize)> {
     Some((count / 8.0, c.len_utf8()))
 }
 
-/// Digits of other scripts, and raised ones: no number that is read.
+/// Digits of other scripts and superscripts, read as NaN.
 fn other_digits(text: &str) -> Option<(f64, usize)> {
     let length = text.find(|c: char| !c.is_numeric() || c.is_ascii_digit());
     let length = length.unwrap_or(text.len());
@@ -179,7 +179,7 @@ const SPELT: [&str; 28] = [
     "ninety",
 ];
 
-/// The number a word spells; `one` is an article.
+/// The number that a word spells, including `one`, which callers take for an article unless it continues a number.
 pub(crate) fn spelt(word: &str) -> Option<f64> {
     let rank = SPELT.iter().position(|&spelt| spelt == word)?;
     Some(if rank < 20 {
@@ -189,7 +189,7 @@ pub(crate) fn spelt(word: &str) -> Option<f64> {
     })
 }
 
-/// Whether "five" goes on from "twenty", "thirty" from "two hundred".
+/// Whether `more` continues the number `value`: "five" after "twenty", "thirty" after "two hundred".
 pub(crate) fn continues(value: f64, more: f64) -> bool {
     let step = if more < 10.0 { 10.0 } else { 100.0 };
     more > 0.0 && value >= step + 10.0 && value % step == 0.0

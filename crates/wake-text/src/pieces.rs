@@ -4,7 +4,7 @@ use crate::cleaning::{Cleaned, clean};
 use crate::numbers::{continues, digits, spelt, unsigned};
 use std::ops::Range;
 
-/// A prompt in lower case and usual forms, as CLIP's cleaning leaves it, with the places its bytes came from.
+/// A prompt in lower case and usual forms, as CLIP's cleaning leaves it, with the origin of each byte.
 #[derive(Debug)]
 pub(crate) struct Text<'p> {
     prompt: &'p str,
@@ -19,12 +19,12 @@ impl<'p> Text<'p> {
         }
     }
 
-    /// The bytes of the prompt that a range of the text came from.
+    /// The byte range of the prompt that a range of the text came from.
     pub(crate) fn span(&self, range: Range<usize>) -> Range<usize> {
         self.cleaned.span(range, self.prompt)
     }
 
-    /// The pieces of the text; hyphens between words are spaces.
+    /// Splits the text into pieces; hyphens between words are spaces.
     pub(crate) fn pieces(&self) -> Vec<Piece<'_>> {
         let text = self.cleaned.text.as_str();
         let mut found: Vec<Piece<'_>> = Vec::new();
@@ -49,7 +49,7 @@ impl<'p> Text<'p> {
         found
     }
 
-    /// The mark at a place, if it is one, and its length.
+    /// The mark at a place, if there is one, and its length.
     fn mark(&self, at: usize, c: char, last: Option<&Piece<'_>>) -> (Option<Kind<'static>>, usize) {
         let rest = &self.cleaned.text[at..];
         let dots = rest.len() - rest.trim_start_matches('.').len();
@@ -82,8 +82,8 @@ impl<'p> Text<'p> {
         (kind, length)
     }
 
-    /// Whether the full stop at a place shortens the word before it and ends no sentence: the next letter is
-    /// no capital.
+    /// Whether the full stop at a place belongs to an abbreviation and does not end the sentence: the next letter is
+    /// not a capital.
     fn is_abbreviation(&self, at: usize, last: Option<&Piece<'_>>) -> bool {
         let Some(Piece {
             kind: Kind::Word(word),
@@ -110,7 +110,7 @@ const LONG_MARKS: [&str; 11] = [
     "+/-", "+-", "<=", ">=", "=<", "=>", "<>", "!=", "==", "<<", ">>",
 ];
 
-/// Whether a character that is no letter and no digit says nothing: space, quotes, signs of "about", bullets.
+/// Whether a character other than a letter or digit has no meaning: white space, quotes, signs of "about", bullets.
 fn is_silent(c: char) -> bool {
     c.is_whitespace()
         || c.is_control()
@@ -145,13 +145,13 @@ pub(crate) struct Piece<'a> {
     pub(crate) place: Range<usize>,
 }
 
-/// What a piece is.
+/// Kind of a piece.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Kind<'a> {
     Number(f64),
-    /// Digits that are not one number, such as `1.2.3` and `l0`.
+    /// Digits that do not form one number, such as `1.2.3` and `l0`.
     Figure,
-    /// Letters, with slashes and apostrophes between them; or `°`.
+    /// Letters, possibly with slashes and apostrophes between them; or `°`.
     Word(&'a str),
     /// Punctuation within a sentence.
     Comma,
@@ -162,9 +162,9 @@ pub(crate) enum Kind<'a> {
     /// A dash or dots before a number.
     Dash,
     PlusMinus,
-    /// `<`, `>=`, `≤`, `≠` and their like.
+    /// `<`, `>=`, `≤`, `≠` and similar signs.
     Bound,
-    /// `×`, `*`, or a slash that joins no words.
+    /// `×`, `*`, or a slash that does not join words.
     Cross,
     /// Any other sign, such as `%` and `→`.
     Symbol,
@@ -173,7 +173,7 @@ pub(crate) enum Kind<'a> {
 /// Marks after which `.5` is a number.
 const OPENING: &str = "([{,;:=<>\u{2264}\u{2265}\u{B1}~+-\u{2212}\u{2013}/@|";
 
-/// The number at a place of a text, and its length. A sign counts where no letter or digit stands before it.
+/// The number at a place of a text, and its length. A sign counts unless a letter or digit precedes it.
 fn number(text: &str, at: usize) -> Option<(Kind<'static>, usize)> {
     let rest = &text[at..];
     let after_word = text[..at]
@@ -184,7 +184,7 @@ fn number(text: &str, at: usize) -> Option<(Kind<'static>, usize)> {
         .into_iter()
         .find(|&sign| !after_word && rest.starts_with(sign));
     let sign_length = sign.map_or(0, char::len_utf8);
-    // A point right after a word, a unit or a bracket ends it, and opens no number.
+    // A point right after a word, a unit or a bracket ends it and does not start a number.
     let opens = |c: char| c.is_whitespace() || OPENING.contains(c);
     if rest.starts_with('.') && !text[..at].chars().next_back().is_none_or(opens) {
         return None;
@@ -203,7 +203,7 @@ fn number(text: &str, at: usize) -> Option<(Kind<'static>, usize)> {
     Some((kind, sign_length + length))
 }
 
-/// Takes a word that spells a number, or continues one ("twenty-five", "ten thousand"), as that number.
+/// Reads a word that spells a number, or continues one ("twenty-five", "ten thousand"); returns whether it does.
 fn join_spelt<'a>(found: &mut Vec<Piece<'a>>, piece: &Piece<'a>) -> bool {
     let Kind::Word(word) = piece.kind else {
         return false;
@@ -233,14 +233,14 @@ fn join_spelt<'a>(found: &mut Vec<Piece<'a>>, piece: &Piece<'a>) -> bool {
     true
 }
 
-/// Length of a letter and the digits right after it, such as `l0` and `u10`.
+/// Length of a letter and the digits right after it, as in `l0` and `u10`.
 fn lettered(text: &str) -> Option<usize> {
     let letter = text.chars().next().filter(|c| c.is_alphabetic())?;
     let digits = digits(&text.as_bytes()[letter.len_utf8()..]);
     (digits > 0).then_some(letter.len_utf8() + digits)
 }
 
-/// The word a text starts with, and its length: without the dots of `m.p.h.` and the `'s` of `ship's`, with the
+/// The word at the start of a text, and its length: without the dots of `m.p.h.` or the `'s` of `ship's`, with the
 /// power of `s-1`.
 fn word(text: &str) -> Option<(&str, usize)> {
     if let Some(sign) = text.chars().next().filter(|c| matches!(c, '°' | 'º' | '˚')) {
@@ -266,7 +266,7 @@ fn word(text: &str) -> Option<(&str, usize)> {
     Some(power.unwrap_or((whole.strip_suffix("'s").unwrap_or(whole), whole.len())))
 }
 
-/// `w/` and `w/o`, and their length.
+/// Reads `w/` and `w/o`; returns the full word and the length read.
 fn shortened(text: &str) -> Option<(&'static str, usize)> {
     let ends = |length: usize| !text[length..].starts_with(|c: char| c.is_alphabetic() || c == '/');
     match text.strip_prefix("w/")? {

@@ -1,8 +1,8 @@
-//! Prompt → the values it states, and what of it stays unread.
+//! Prompt → stated values and unread parts.
 //!
-//! Every number with a unit and every compass word belongs to a subject: to the one named right after it ("3 mps
-//! wind"), else to the last one named before it in its sentence ("a ship moving at 10 mps"), else to the next one.
-//! Subject and unit together say which value it is; where they say none, it stays unread.
+//! Every number with a unit and every compass word belongs to a subject: the one named right after it ("3 mps wind"),
+//! else the last one named before it in the sentence ("a ship moving at 10 mps"), else the next one. Subject and unit
+//! together determine the value; where they determine none, the number stays unread.
 
 use crate::error::Result;
 use crate::pieces::{Kind, Text};
@@ -12,11 +12,11 @@ use serde::Serialize;
 use std::fmt;
 use std::ops::Range;
 
-/// Result of reading a prompt: the values it states, and the parts that were not understood.
+/// Result of reading a prompt: the stated values and the parts that were not understood.
 ///
-/// Every number and every word of a prompt is a part of `scene`, filler that changes no value ("a", "of", "image",
-/// "sea"), or named in `unread`; so is every sign that is neither punctuation nor a part of a number. A text without a
-/// number and without a word of the field [states nothing](Self::states_nothing) as a whole, and names no words.
+/// Every number and word of a prompt is part of `scene`, is filler that changes no value ("a", "of", "image", "sea"),
+/// or is listed in `unread`; so is every sign that is neither punctuation nor part of a number. A text without
+/// numbers and without words of the field [states nothing](Self::states_nothing), and `unread` is empty.
 ///
 /// | in a prompt | read as |
 /// | --- | --- |
@@ -29,13 +29,13 @@ use std::ops::Range;
 /// | "stationary ship", "anchored", "at rest" | a ship of 0 m/s |
 /// | "wake" | a ship, unless the prompt says that there is none |
 /// | "5 ± 1 m/s" | 5 m/s; the margin stays unread |
-/// | "5 to 7 m/s", numbers without a unit, what is denied ("not at 10 m/s"), lists of thousands of degrees | unread |
+/// | "5 to 7 m/s", numbers without a unit, negated values ("not at 10 m/s"), lists of thousands of degrees | unread |
 /// | "at least 5 m/s", ">= 5 m/s", "twice 5 m/s", "half of 10 m/s", "opposite to north", "45 degrees to port" and other words that change a value | word and value unread |
 /// | an unknown word right before a number, or bound to it by "of", "to" or a colon | word and value unread |
 /// | "unless …", "if …", "except …", "instead …", up to the next comma | unread |
-/// | "light wind", "a fast ferry" without a number | ship or wind; the strength unread |
+/// | "light wind", "a fast ferry" without a number | ship or wind; the strength stays unread |
 ///
-/// A compass word and a number may state the same direction up to half a point (11.25 degrees); the number counts.
+/// A compass word and a number for one direction may differ by up to half a point (11.25 degrees); the number is used.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Reading {
     /// The values the prompt states.
@@ -56,24 +56,24 @@ pub struct Unread {
 }
 
 impl Unread {
-    /// Whether a number or a word of the field (ships, wind, directions, units and their like) is among its words, so
-    /// that it may state a value; other unread words only describe.
+    /// Whether its words include a number or a word of the field (ships, wind, directions, units and the like), so
+    /// that it may state a value; other unread words are only descriptive.
     pub fn is_of_the_field(&self) -> bool {
         self.of_the_field
     }
 }
 
 impl Reading {
-    /// Reads a prompt: every [`Wording`](crate::Wording) and free text like it, in any case and spacing, the
+    /// Reads a prompt: any [`Wording`](crate::Wording), or similar free text, in any case and spacing, with the
     /// sentences in any order.
     ///
-    /// A text that states nothing is no error; see [`Reading::states_nothing`].
+    /// A text that states nothing is not an error; see [`Reading::states_nothing`].
     ///
     /// # Errors
     ///
     /// [`Impossible`](crate::Error::Impossible) for a value that no scene can have,
-    /// [`Contradiction`](crate::Error::Contradiction) for two different
-    /// values of the same thing; both quote the words.
+    /// [`Contradiction`](crate::Error::Contradiction) for two different values of the same quantity; both quote the
+    /// words.
     ///
     /// # Examples
     ///
@@ -110,7 +110,7 @@ impl Reading {
             }
         });
         let mut unread: Vec<Unread> = unread.collect();
-        // A text about something else states nothing as a whole.
+        // A text about something else states nothing and has no unread parts.
         if scene.is_empty() && !unread.iter().any(Unread::is_of_the_field) {
             unread.clear();
         }
@@ -124,7 +124,7 @@ impl Reading {
 }
 
 impl fmt::Display for Reading {
-    /// The stated values under their keys in a scene file, one a line, and a line of what stays unread.
+    /// Writes the stated values under their scene-file keys, one a line, and a line with the unread parts.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.states_nothing() {
             write!(f, "the prompt states nothing of a scene")?;
@@ -140,7 +140,7 @@ impl fmt::Display for Reading {
 }
 
 impl fmt::Display for Unread {
-    /// The text in quotes, escaped, at most its first 80 characters.
+    /// Writes the text in quotes, escaped and cut after 80 characters.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let end = self.text.char_indices().nth(80).map(|(at, _)| at);
         let more = if end.is_some() { " …" } else { "" };
@@ -153,7 +153,7 @@ impl fmt::Display for Unread {
 }
 
 impl PartialScene {
-    /// The values a prompt states: the scene of [`Reading::of`], which also says what stays unread.
+    /// Reads the values that a prompt states: the scene of [`Reading::of`], which also lists the unread parts.
     ///
     /// # Errors
     ///
@@ -283,7 +283,7 @@ mod tests {
         assert_eq!(read("no wind at all, wind 0 mps").wind_speed, Some(0.0));
     }
 
-    /// A line of `tests/prompts.txt` in the notation of that file.
+    /// A reading in the notation of `tests/prompts.txt`.
     fn in_short(reading: Result<Reading>) -> String {
         let reading = match reading {
             Ok(reading) => reading,
@@ -302,7 +302,7 @@ mod tests {
             ("f", said.fetch),
             ("i", said.incidence),
         ];
-        // Five significant digits and the place of the fourth decimal: what the file writes.
+        // Rounded to three decimals, as the values of the file are.
         let values = values
             .into_iter()
             .filter_map(|(key, value)| Some(format!("{key}={:.3}", value?)));
@@ -358,7 +358,7 @@ mod tests {
             let _ = PartialScene::read(&prompt);
         }
 
-        /// What is read lies in the ranges of a scene; what is refused is quoted from the prompt.
+        /// Values read are within the ranges of a scene; errors quote the prompt.
         #[test]
         fn any_words_of_the_field_are_read_or_refused(
             words in prop::collection::vec(
@@ -379,13 +379,13 @@ mod tests {
         }
     }
 
-    /// A number that is not named as unread counts: another in its place is another reading.
+    /// A number that is not listed as unread affects the result: replacing it changes the reading.
     #[test]
     fn no_number_is_dropped_in_silence() {
         let words = "[1-9][0-9]?(\\.5|,5)?|mps|m/s|km/h|knots|km|miles|degrees|deg\\.|°|±|to|between|and|ship|no|not|\
                      without|a|wind|fetch|of|incidence|angle|heading|from|toward|the|north|westerly|waves|length|at|[.,:-]";
         let prompts = prop::collection::vec(words, 0..12);
-        // In front of one or two digits, 18 and 36 add whole turns, which leave a direction what it is.
+        // Before one or two digits, 18 and 36 add whole turns, which leave a direction unchanged.
         let extras = (3..40_u32).prop_filter("no whole turn", |extra| extra % 18 != 0);
         proptest!(ProptestConfig::with_cases(2000), |(words in prompts, extra in extras)| {
             let prompt = words.join(" ");
@@ -404,7 +404,7 @@ mod tests {
         });
     }
 
-    /// Speeds, lengths and directions as people write them, and what they are in SI and degrees.
+    /// Speeds as people write them, with their values in m/s.
     fn speeds() -> impl Strategy<Value = (String, f64)> {
         let units = [
             (" m/s", 1.0),
@@ -438,7 +438,7 @@ mod tests {
         })
     }
 
-    /// A direction something goes to, and its degrees.
+    /// Directions toward which something moves, with their degrees.
     fn goals() -> impl Strategy<Value = (String, f64)> {
         let names = [
             "north",
@@ -470,7 +470,7 @@ mod tests {
     }
 
     proptest! {
-        /// Units and compass words in free text come back as numbers.
+        /// Units and compass words in free text are read as numbers.
         #[test]
         fn units_and_compass_words_go_round(
             (ship, ship_speed) in speeds(), (wind, wind_speed) in speeds(), (goal, heading) in goals(),

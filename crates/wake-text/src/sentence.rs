@@ -1,4 +1,4 @@
-//! A sentence of a prompt while it is read.
+//! Reads one sentence of a prompt.
 
 use crate::amounts::{Amount, Dimension, Group, group, is_unit};
 use crate::compass::{Compass, Form, POINT, compass, is_compass};
@@ -14,17 +14,17 @@ use crate::subjects::{
 };
 use std::ops::Range;
 
-/// Subjects on each side among which the owner of a number is sought.
+/// Subjects on each side that are searched for the owner of a number.
 const NEAR: usize = 64;
 
-/// Where a direction points.
+/// Whether something moves toward a direction or comes from it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Way {
     Toward,
     From,
 }
 
-/// A sentence while it is read.
+/// A sentence while it is being read.
 pub(crate) struct Sentence<'t, 'a> {
     pieces: &'t [Piece<'a>],
     marks: Vec<Mark>,
@@ -87,7 +87,7 @@ impl<'t, 'a> Sentence<'t, 'a> {
         self.marks[pieces].fill(mark);
     }
 
-    /// The pieces of a group of numbers with the words that change it, if some do.
+    /// The pieces of a group of numbers and the words that modify it, if there are any.
     fn changed(&self, at: usize, group: &Group) -> Option<Range<usize>> {
         let (turns, end) = match group {
             Group::One(amount, end) => (amount.dimension == Some(Dimension::Angle), *end),
@@ -99,14 +99,14 @@ impl<'t, 'a> Sentence<'t, 'a> {
         Some(before.unwrap_or(at)..after.unwrap_or(end))
     }
 
-    /// The word that bounds a quantity which its subject does not follow: "wind under 5 m/s", but "under 5 m/s wind".
+    /// Index of the word that bounds a quantity, as in "wind under 5 m/s" (but not in "under 5 m/s wind").
     fn bounds(&self, start: usize) -> Option<usize> {
         let before = self.before(start)?;
         let word = word_at(self.pieces, before)?;
         matches!(word, "under" | "over" | "past" | "near").then_some(before)
     }
 
-    /// Takes in what is denied; its subjects own nothing.
+    /// Records a negation; its subjects own no numbers.
     fn deny(&mut self, denied: &Denied, statement: &mut Statement<'_>) -> Result<()> {
         self.subjects
             .retain(|named| !denied.pieces.contains(&named.at));
@@ -125,7 +125,7 @@ impl<'t, 'a> Sentence<'t, 'a> {
         Ok(())
     }
 
-    /// Takes in a number with its unit.
+    /// Records a number with its unit.
     fn measure(&mut self, amount: &Amount, statement: &mut Statement<'_>) -> Result<()> {
         let pieces = amount.pieces.clone();
         let owner = amount
@@ -136,7 +136,7 @@ impl<'t, 'a> Sentence<'t, 'a> {
             .and_then(|((named, _), dimension)| Value::of(named.subject, dimension));
         let Some(((owner, right_after), value)) = owner.zip(value) else {
             if let Some((owner, right_after)) = owner.filter(|(owner, _)| is_own(owner.subject)) {
-                // What a foreign thing has is named with it.
+                // The unread part includes the subject that owns it.
                 let end = if right_after {
                     owner.at + 1
                 } else {
@@ -185,7 +185,7 @@ impl<'t, 'a> Sentence<'t, 'a> {
         Ok(())
     }
 
-    /// Takes in a compass word; the piece after it.
+    /// Records a compass word; returns the index after it.
     fn point(&mut self, compass: &Compass, statement: &mut Statement<'_>) -> Result<usize> {
         let Range { start, end } = compass.pieces;
         let (way, from) = self.way(start);
@@ -225,7 +225,7 @@ impl<'t, 'a> Sentence<'t, 'a> {
         Ok(end)
     }
 
-    /// The end of a bearing in a quadrant, "north 45 degrees west", whose compass word ends at a piece.
+    /// The end of a quadrant bearing such as "north 45 degrees west", whose first compass word ends at `end`.
     fn quadrant(&self, end: usize) -> Option<usize> {
         let number = self.pieces.get(end)?;
         matches!(number.kind, Kind::Number(_)).then_some(())?;
@@ -233,7 +233,7 @@ impl<'t, 'a> Sentence<'t, 'a> {
         Some(compass(self.pieces, end + 1 + unit)?.pieces.end)
     }
 
-    /// Which direction a compass word states.
+    /// The direction that a compass word states.
     fn direction(&self, found: &Compass, way: Option<Way>) -> Option<(Value, Way)> {
         let Range { start, end } = found.pieces.clone();
         if self.is_of_many(&found.pieces) {
@@ -291,7 +291,7 @@ impl<'t, 'a> Sentence<'t, 'a> {
         after || before.into_iter().any(|before| before.pieces.end == join)
     }
 
-    /// The subject that the words from a piece on describe, across its strength and a number.
+    /// The subject that the words from a piece on describe, skipping strengths and numbers.
     fn described(&self, from: usize) -> Option<Subject> {
         let mut at = from;
         while let Some(Group::One(_, end)) = group(self.pieces, at) {
@@ -304,7 +304,7 @@ impl<'t, 'a> Sentence<'t, 'a> {
         noun(word).filter(|_| !is_motion(word))
     }
 
-    /// Whether a compass word may end before a piece: "the north of", "the North Sea" are places.
+    /// Whether a direction may end before a piece; "the north of" and "the North Sea" are places.
     fn may_follow(&self, at: usize) -> bool {
         match word_at(self.pieces, at) {
             None => true,
@@ -316,7 +316,7 @@ impl<'t, 'a> Sentence<'t, 'a> {
         }
     }
 
-    /// The piece before one, across words that say nothing.
+    /// Index of the nearest piece before `at` that is not filler.
     fn before(&self, at: usize) -> Option<usize> {
         let fills = |at: &usize| {
             matches!(self.pieces[*at].kind, Kind::Colon)
@@ -325,7 +325,7 @@ impl<'t, 'a> Sentence<'t, 'a> {
         (0..at).rev().find(|at| !fills(at))
     }
 
-    /// Whether a preposition before a piece says where a direction points, and where it starts.
+    /// The preposition of the direction at a piece, and the piece where the phrase starts.
     fn way(&self, at: usize) -> (Option<Way>, usize) {
         let Some(before) = self.before(at) else {
             return (None, at);
@@ -340,7 +340,7 @@ impl<'t, 'a> Sentence<'t, 'a> {
         }
     }
 
-    /// A "from" before a direction that describing words keep from it: "from a stormy 30 degrees".
+    /// A "from" that describing words separate from its direction: "from a stormy 30 degrees".
     fn lost_from(&self, start: usize) -> Option<usize> {
         let describes = |at: &usize| {
             word_at(self.pieces, *at).is_some_and(|word| {
@@ -355,7 +355,7 @@ impl<'t, 'a> Sentence<'t, 'a> {
         (word_at(self.pieces, from) == Some("from")).then_some(from)
     }
 
-    /// The subject that a quantity belongs to, and whether it stands right after it.
+    /// The subject that owns a quantity, and whether it stands right after the quantity.
     fn owner(&self, quantity: Range<usize>, dimension: Dimension) -> Option<(Named, bool)> {
         let able = |named: &&Named| named.subject.can_have(dimension);
         let start = self
@@ -372,14 +372,14 @@ impl<'t, 'a> Sentence<'t, 'a> {
         }
     }
 
-    /// Whether a colon follows a word, perhaps after two more: "wind speed: 3 mps".
+    /// Whether a colon follows a word, possibly after two more words: "wind speed: 3 mps".
     fn is_label(&self, at: usize) -> bool {
         let mut next = self.pieces.iter().skip(at + 1).take(3);
         let mark = next.find(|piece| !matches!(piece.kind, Kind::Word(_)));
         mark.is_some_and(|piece| piece.kind == Kind::Colon)
     }
 
-    /// Whether what stands between a unit and a noun is at most two words that describe the noun.
+    /// Whether a unit and a noun are separated by at most two words, which describe the noun.
     fn is_one_phrase(&self, between: Range<usize>) -> bool {
         between.len() <= 2
             && between
@@ -387,7 +387,7 @@ impl<'t, 'a> Sentence<'t, 'a> {
                 .all(|at| word_at(self.pieces, at).is_some_and(|word| !is_link(word)))
     }
 
-    /// Takes in that a ship makes no way.
+    /// Records that a ship does not move.
     fn rest(&mut self, at: usize, statement: &mut Statement<'_>) -> Result<()> {
         let Some(word) = word_at(self.pieces, at) else {
             return Ok(());
@@ -412,7 +412,7 @@ impl<'t, 'a> Sentence<'t, 'a> {
         Ok(())
     }
 
-    /// What was not taken in; neighbours are one.
+    /// Unread parts; neighbouring pieces are merged.
     pub(crate) fn unread(&self, scene: &PartialScene) -> Vec<Left> {
         let sentence = Marked {
             pieces: self.pieces,
@@ -423,7 +423,7 @@ impl<'t, 'a> Sentence<'t, 'a> {
     }
 }
 
-/// Whether a subject is named with the numbers that stay unread.
+/// Whether a subject is reported as unread together with its numbers.
 fn is_own(subject: Subject) -> bool {
     matches!(
         subject,

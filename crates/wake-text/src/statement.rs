@@ -1,4 +1,4 @@
-//! Values that a prompt states, and their consistency.
+//! Values that a prompt states, and checks of their consistency.
 
 use crate::amounts::Dimension;
 use crate::error::{Error, Result};
@@ -9,19 +9,19 @@ use std::fmt;
 use std::ops::Range;
 use wake_physics::{Scene, scene::Ship};
 
-/// Scene values that a prompt states; a value that it does not state is `None`.
+/// Scene values that a prompt states; values that it does not state are `None`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PartialScene {
-    /// Whether there is a ship; `Some(false)`: open sea.
+    /// Whether there is a ship; `Some(false)` is open sea.
     pub ship: Option<bool>,
     /// Ship speed in m/s.
     pub ship_speed: Option<f64>,
-    /// Heading of the ship, in degrees clockwise from azimuth, 0 up to 360.
+    /// Heading of the ship, in degrees clockwise from azimuth, in [0, 360).
     pub ship_heading: Option<f64>,
     /// Wind speed at 10 m height, in m/s.
     pub wind_speed: Option<f64>,
-    /// Direction toward which the wind blows, in degrees clockwise from azimuth, 0 up to 360.
+    /// Direction toward which the wind blows, in degrees clockwise from azimuth, in [0, 360).
     pub wind_toward: Option<f64>,
     /// Fetch in m.
     pub fetch: Option<f64>,
@@ -30,11 +30,11 @@ pub struct PartialScene {
 }
 
 impl PartialScene {
-    /// Values that the prompt of a scene states: speeds rounded to 0.1 m/s, the others to 1, directions within
-    /// 0 up to 360; halves away from zero.
+    /// Values that the prompt of a scene states: speeds rounded to 0.1 m/s, the others to 1, halves away from zero;
+    /// directions in [0, 360).
     ///
-    /// Without a ship its speed and heading stay open; without wind its direction and the fetch. Of several ships the
-    /// first is meant.
+    /// Without a ship, its speed and heading are `None`; without wind, its direction and the fetch. With several
+    /// ships, the first is described.
     pub fn of(scene: &Scene) -> Self {
         let ship = scene.ships.first();
         let wind_speed = tenths(scene.sea.wind_speed);
@@ -50,14 +50,14 @@ impl PartialScene {
         }
     }
 
-    /// Replaces values of `base` by the stated ones.
+    /// Returns `base` with its values replaced by the stated ones.
     ///
-    /// A stated speed or heading brings a ship, the default one if `base` has none. Of several ships the first gets them,
-    /// and "no ship" takes all away.
+    /// A stated speed or heading implies a ship, the default one if `base` has none. With several ships, the first is
+    /// changed; "no ship" removes all.
     ///
     /// # Errors
     ///
-    /// [`Error::Scene`] if the scene is not valid then.
+    /// [`Error::Scene`] if the result is not valid.
     pub fn onto(&self, base: &Scene) -> Result<Scene> {
         let mut scene = base.clone();
         self.set(&mut scene);
@@ -83,7 +83,7 @@ impl PartialScene {
         radar.incidence = self.incidence.unwrap_or(radar.incidence);
     }
 
-    /// Fills open values from `other`; without a ship, the ship's values stay open.
+    /// Fills missing values from `other`; without a ship, the ship's values stay missing.
     #[must_use]
     pub fn or(self, other: Self) -> Self {
         let ship = self.says_of_ships().or(other.ship);
@@ -100,7 +100,7 @@ impl PartialScene {
         }
     }
 
-    /// Whether there is a ship; a stated speed or heading is one of a ship.
+    /// Whether there is a ship; a stated speed or heading implies one.
     pub fn says_of_ships(&self) -> Option<bool> {
         let moves = self.ship_speed.or(self.ship_heading).is_some();
         self.ship.or(moves.then_some(true))
@@ -111,7 +111,7 @@ impl PartialScene {
         *self == Self::default()
     }
 
-    /// Checks that some scene can have the stated values, which the prompt gives in `words`.
+    /// Checks that a scene can have the stated values, which the prompt gives in `words`.
     fn check(&self, words: &str) -> Result<()> {
         let mut scene = Scene::default();
         self.set(&mut scene);
@@ -123,7 +123,7 @@ impl PartialScene {
 }
 
 impl fmt::Display for PartialScene {
-    /// Whether there is a ship, then the stated values under their keys in a scene file, one a line.
+    /// Writes whether there is a ship, then the stated values under their scene-file keys, one a line.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self.ship {
             Some(true) => "there is a ship",
@@ -147,7 +147,7 @@ impl fmt::Display for PartialScene {
     }
 }
 
-/// One of the values a prompt can state.
+/// A value that a prompt can state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Value {
     ShipSpeed,
@@ -187,7 +187,7 @@ impl Value {
     }
 }
 
-/// A value as stated: within `margin` of `number`, by the words at a place.
+/// A stated value: within `margin` of `number`, from the words at `place`.
 struct Stated {
     value: Value,
     number: f64,
@@ -217,7 +217,7 @@ impl<'p> Statement<'p> {
         }
     }
 
-    /// Takes in that a subject is named.
+    /// Records that a subject is named.
     pub(crate) fn name(&mut self, subject: Subject, place: Range<usize>) {
         match subject {
             Subject::Ship => self.ship = Some(place),
@@ -226,12 +226,13 @@ impl<'p> Statement<'p> {
         }
     }
 
-    /// Takes in that there is no ship.
+    /// Records that there is no ship.
     pub(crate) fn deny_ship(&mut self, place: Range<usize>) {
         self.no_ship = Some(place);
     }
 
-    /// Notes a value, which must be possible and agree with one noted before; the closer one counts.
+    /// Records a value, which must be possible and agree with any earlier one; the one with the smaller margin is
+    /// kept.
     pub(crate) fn set(
         &mut self,
         value: Value,
@@ -321,7 +322,7 @@ fn tenths(value: f64) -> f64 {
     (value * 10.0).round() / 10.0 + 0.0
 }
 
-/// Rounds to whole degrees within 0 up to 360.
+/// Rounds to whole degrees in [0, 360).
 fn direction(degrees: f64) -> f64 {
     degrees.rem_euclid(360.0).round() % 360.0
 }

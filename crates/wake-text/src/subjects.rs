@@ -1,10 +1,10 @@
-//! What a sentence speaks of, and what it denies.
+//! Subjects of a sentence, and classes of words.
 
 use crate::amounts::Dimension;
 use crate::filler::is_listed;
 use crate::pieces::{Piece, word_at};
 
-/// What a number can belong to.
+/// Subject that a number can belong to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Subject {
     Ship,
@@ -13,22 +13,22 @@ pub(crate) enum Subject {
     Wind,
     Fetch,
     Incidence,
-    /// An angle of its own.
+    /// An angle without an owner.
     Angle,
-    /// Waves: a scene has them from its wind.
+    /// Waves, which a scene derives from its wind.
     Wave,
-    /// Something that has a length, such as the depth.
+    /// Something with a length, such as the depth.
     Length,
-    /// Something that has an angle or a temperature, such as the latitude.
+    /// Something with an angle or a temperature, such as the latitude.
     Degrees,
-    /// Something else that no prompt can state, such as a current.
+    /// Anything else that a prompt cannot state, such as a current.
     Other,
-    /// Something else that a prompt may name for its own sake, such as the satellite.
+    /// Anything else that a prompt may mention without a value, such as the satellite.
     Bystander,
 }
 
 impl Subject {
-    /// Whether a quantity may be one of this subject.
+    /// Whether this subject can have a quantity of a dimension.
     pub(crate) fn can_have(self, dimension: Dimension) -> bool {
         match self {
             Self::Incidence | Self::Angle | Self::Degrees => dimension == Dimension::Angle,
@@ -47,7 +47,7 @@ pub(crate) struct Named {
     pub(crate) at: usize,
 }
 
-/// The subjects a sentence names, in their order.
+/// The subjects that a sentence names, in order.
 pub(crate) fn subjects(sentence: &[Piece<'_>]) -> Vec<Named> {
     let named = |at: usize| {
         Some(Named {
@@ -63,7 +63,7 @@ fn subject(sentence: &[Piece<'_>], at: usize) -> Option<Subject> {
     let noun = noun(word_at(sentence, at)?)?;
     let owner = word_before(sentence, at).and_then(self::noun);
     match noun {
-        // "wind heading toward" is about the wind, "incidence angle" about the incidence.
+        // In "wind heading toward" the subject is the wind, in "incidence angle" the incidence.
         Subject::Heading if owner == Some(Subject::Wind) => None,
         Subject::Heading
             if word_before(sentence, at) == Some("of")
@@ -117,7 +117,7 @@ pub(crate) fn noun(word: &str) -> Option<Subject> {
     })
 }
 
-/// Whether a word says that a ship makes no way.
+/// Whether a word means that a ship does not move.
 pub(crate) fn is_at_rest(word: &str) -> bool {
     matches!(
         word,
@@ -129,7 +129,7 @@ pub(crate) fn word_before<'a>(sentence: &[Piece<'a>], at: usize) -> Option<&'a s
     word_at(sentence, at.checked_sub(1)?)
 }
 
-/// Whether this word ends what is said of the noun before it.
+/// Whether this word ends the description of the noun before it.
 pub(crate) fn is_link(word: &str) -> bool {
     [
         "a", "an", "the", "and", "or", "but", "while", "with", "without", "at", "in", "on", "by",
@@ -141,7 +141,7 @@ pub(crate) fn is_link(word: &str) -> bool {
         || matches!(word, "heading" | "blowing" | "blows")
 }
 
-/// Whether a word says that a ship moves.
+/// Whether a word means that a ship moves.
 pub(crate) fn is_motion(word: &str) -> bool {
     [
         "moving",
@@ -178,7 +178,7 @@ pub(crate) fn says_nothing(word: &str) -> bool {
     is_listed(word) || is_filler(word) || is_motion(word)
 }
 
-/// Whether a word makes what follows nearly so.
+/// Whether a word marks what follows as approximate.
 pub(crate) fn is_approximate(word: &str) -> bool {
     matches!(
         word,
@@ -196,7 +196,7 @@ pub(crate) fn is_approximate(word: &str) -> bool {
     )
 }
 
-/// Whether a word tells how much without a number: "light wind", "a fast ferry".
+/// Whether a word gives a strength without a number: "light wind", "a fast ferry".
 pub(crate) fn is_strength(word: &str) -> bool {
     [
         "light", "gentle", "moderate", "fresh", "strong", "stiff", "weak", "high", "low", "heavy",
@@ -206,7 +206,7 @@ pub(crate) fn is_strength(word: &str) -> bool {
     .contains(&word)
 }
 
-/// Whether a word between "from" and a direction says nothing.
+/// Whether a word between "from" and a direction has no meaning.
 pub(crate) fn is_filler(word: &str) -> bool {
     [
         "about",
@@ -236,7 +236,7 @@ pub(crate) fn is_filler(word: &str) -> bool {
     .contains(&word)
 }
 
-/// Whether a word speaks of speed or direction, and so of a number nearby.
+/// Whether a word names speed or direction, and so refers to a number nearby.
 pub(crate) fn is_attribute(word: &str) -> bool {
     [
         "speed",
@@ -254,7 +254,7 @@ pub(crate) fn is_attribute(word: &str) -> bool {
     .contains(&word)
 }
 
-/// Whether a word speaks of sea or radar, but of nothing a prompt can state.
+/// Whether a word is about sea or radar, but a prompt cannot state it.
 pub(crate) fn is_unstated(word: &str) -> bool {
     [
         "calm",
@@ -291,7 +291,7 @@ pub(crate) fn is_unstated(word: &str) -> bool {
     .contains(&word)
 }
 
-/// Whether a compass word after this one says where something goes.
+/// Whether a compass word after this one is the direction in which something moves.
 pub(crate) fn leads(word: &str) -> bool {
     is_motion(word) || matches!(word, "heading" | "course" | "blowing" | "blows")
 }

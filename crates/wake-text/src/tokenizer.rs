@@ -8,17 +8,17 @@ use std::path::Path;
 use std::sync::LazyLock;
 use tokenizers::utils::SysRegex;
 
-/// Number of tokens the text encoder of CLIP takes, start and end mark included.
+/// Number of tokens that CLIP's text encoder takes, including start and end marks.
 pub const TOKENS: usize = 77;
 
-/// A tokenized prompt, as CLIP's text encoder takes it.
+/// A tokenized prompt, the input of CLIP's text encoder.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Tokens {
     /// Start mark, words, end mark, padding.
     pub ids: [u32; TOKENS],
-    /// `true` up to the end mark, `false` on the padding.
+    /// `true` up to and including the end mark, `false` on the padding.
     pub mask: [bool; TOKENS],
-    /// Number of tokens before truncation, both marks included.
+    /// Number of tokens before truncation, including both marks.
     pub token_count: usize,
     /// Byte offset in the prompt of the first character that was cut off, always a character boundary.
     pub truncated_at: Option<usize>,
@@ -31,9 +31,9 @@ impl Tokens {
     }
 }
 
-/// CLIP's tokenizer: cleans, splits into words and merges byte pairs.
+/// CLIP's tokenizer: cleans the prompt, splits it into words and merges byte pairs.
 ///
-/// It is immutable and may be shared by threads.
+/// Immutable; threads may share it.
 ///
 /// # Examples
 ///
@@ -55,7 +55,7 @@ pub struct Tokenizer {
 impl Tokenizer {
     /// The tokenizer of Stable Diffusion v1: CLIP's vocabulary of 49,408 tokens, padded with the end mark.
     ///
-    /// The vocabulary lies in the crate; the first call in a process unpacks it.
+    /// The vocabulary is part of the crate; the first call in a process unpacks it.
     pub fn clip() -> &'static Self {
         static CLIP: LazyLock<Tokenizer> = LazyLock::new(|| {
             Tokenizer::new(Vocabulary::embedded().expect("the crate's own vocabulary is whole"))
@@ -63,11 +63,12 @@ impl Tokenizer {
         &CLIP
     }
 
-    /// A tokenizer with the vocabulary of a folder, such as that of a Stable Diffusion model or its
-    /// subfolder `tokenizer`. Only vocabulary and merges are taken from it; cleaning and splitting are CLIP's.
+    /// Loads a tokenizer with the vocabulary of a folder, such as a Stable Diffusion model or its subfolder
+    /// `tokenizer`. Only vocabulary, merges and padding token come from the folder; cleaning and splitting are
+    /// CLIP's.
     ///
-    /// It reads `vocab.json` and `merges.txt`, else `tokenizer.json`; and, where there is a
-    /// `special_tokens_map.json`, its padding token.
+    /// Reads `vocab.json` and `merges.txt`, else `tokenizer.json`; and the padding token of
+    /// `special_tokens_map.json`, if there is one.
     ///
     /// # Errors
     ///
@@ -137,7 +138,8 @@ impl Tokenizer {
     }
 }
 
-/// CLIP's words: an English contraction, a run of letters, one digit, or a run of anything else but white space.
+/// CLIP's words: an English contraction, a run of letters, one digit, or a run of other characters except white
+/// space.
 fn words() -> &'static SysRegex {
     const WORD: &str = r"'s|'t|'re|'ve|'m|'ll|'d|[\p{L}]+|[\p{N}]|[^\s\p{L}\p{N}]+";
     static PATTERN: LazyLock<SysRegex> =
@@ -145,13 +147,13 @@ fn words() -> &'static SysRegex {
     &PATTERN
 }
 
-/// The 77 ids while they are filled.
+/// The 77 ids while they are being filled.
 struct Row {
     ids: [u32; TOKENS],
     end: u32,
-    /// Tokens so far, the ones cut off included.
+    /// Tokens so far, including those cut off.
     count: usize,
-    /// Byte in the cleaned text where the first token without a place starts.
+    /// Byte offset in the cleaned text of the first token that did not fit.
     cut: Option<usize>,
 }
 
@@ -282,7 +284,7 @@ mod tests {
             encode(&format!("{fits}  wake")).truncated_at,
             Some(fits.len() + 2)
         );
-        // 75 words, then one in three tokens: j, ek and yl.
+        // 74 words, then one of three tokens, of which only the first fits.
         let word = encode(&format!("{}1.5", "ship ".repeat(74)));
         assert_eq!(word.truncated_at, Some(74 * 5 + 1));
     }
@@ -303,8 +305,7 @@ mod tests {
         assert_eq!(batch, single);
     }
 
-    /// The same tokenizer, put together from the parts of the crate `tokenizers`, as a `tokenizer.json` of
-    /// CLIP describes it.
+    /// The same tokenizer, assembled from the crate `tokenizers` as CLIP's `tokenizer.json` describes it.
     fn pipeline() -> tokenizers::Tokenizer {
         use tokenizers::normalizers::{Lowercase, NFC, Replace, Sequence};
         use tokenizers::pre_tokenizers::{byte_level::ByteLevel, sequence, split};
@@ -329,7 +330,8 @@ mod tests {
     }
 
     fn assert_agrees(pipeline: &tokenizers::Tokenizer, prompt: &str) {
-        // That pipeline lowers Σ letter by letter and cleans less; where cleaning did its part, both agree.
+        // The pipeline lowers Σ letter by letter and cleans less; the two agree on text that cleaning leaves
+        // unchanged.
         let cleaned = clean(prompt).text;
         if cleaned.contains(['ς', '&']) || cleaned.contains("<|") || clean(&cleaned).text != cleaned
         {
@@ -369,7 +371,7 @@ mod tests {
             assert_whole(&prompt, &encode(&prompt));
         }
 
-        /// What stands before the cut has exactly the tokens that were kept.
+        /// The prompt up to the cut has exactly the tokens that were kept.
         #[test]
         fn the_prompt_up_to_the_cut_fills_the_row(
             words in prop::collection::vec("[a-z]{1,3}|[0-9]|&amp;|e\u{301}|\u{FB02}|\u{65E5}", 76..200)

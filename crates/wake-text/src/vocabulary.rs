@@ -1,8 +1,8 @@
-//! The byte-pair vocabulary: the crate's own, or one from files.
+//! The byte-pair vocabulary, embedded or read from files.
 //!
-//! CLIP's vocabulary follows from its merges alone: the symbols of the 256 bytes; the same with the mark
-//! `</w>` of a word's end; what the 48,894 merges make, in their order; start mark; end mark. So the crate
-//! holds only the merges (`assets/clip_merges.txt.gz`, MIT licence beside it).
+//! CLIP's vocabulary follows from its merges alone: the symbols of the 256 bytes; the same symbols with the
+//! end-of-word mark `</w>`; the results of the 48,894 merges, in order; start mark; end mark. The crate therefore
+//! stores only the merges (`assets/clip_merges.txt.gz`, MIT licence beside it).
 
 use crate::error::{Error, Result};
 use crate::vocabulary_files::{parse_merges, parse_pad, parse_tokenizer, parse_vocab, read};
@@ -23,7 +23,7 @@ const WORD_END: &str = "</w>";
 const CLIP_NAME: &str = "assets/clip_merges.txt.gz";
 const CLIP_MERGES: &[u8] = include_bytes!("../assets/clip_merges.txt.gz");
 
-/// The merges and the ids of the tokens they make.
+/// Merges, token ids and special tokens.
 #[derive(Debug, Clone)]
 pub(crate) struct Vocabulary {
     bpe: BPE,
@@ -83,7 +83,7 @@ impl Vocabulary {
         Ok(vocabulary)
     }
 
-    /// Writes vocabulary, merges, marks and the length of a prompt into a folder, made if absent.
+    /// Writes vocabulary, merges, marks and prompt length into a folder, which is created if absent.
     pub(crate) fn save(&self, folder: &Path, tokens: usize) -> Result<()> {
         let failed = |message: String| Error::Write {
             path: folder.to_owned(),
@@ -129,16 +129,16 @@ impl Vocabulary {
         })
     }
 
-    /// The tokens of a word spelt in symbols: id, and first byte in the symbols.
+    /// Calls `each` with the id of every token of a word spelt in symbols, and its first byte in the symbols.
     pub(crate) fn for_tokens(&self, word: &str, mut each: impl FnMut(u32, usize)) {
-        // Cannot fail: an unknown symbol becomes the end mark, which is in every vocabulary.
+        // Cannot fail: an unknown symbol becomes the end mark, which every vocabulary has.
         for token in self.bpe.tokenize(word).unwrap_or_default() {
             each(token.id, token.offsets.0);
         }
     }
 }
 
-/// The id of a token that must be there.
+/// The id of a required token.
 fn id(bpe: &BPE, path: &Path, token: &str) -> Result<u32> {
     bpe.token_to_id(token).ok_or_else(|| Error::File {
         path: path.to_owned(),
@@ -146,7 +146,7 @@ fn id(bpe: &BPE, path: &Path, token: &str) -> Result<u32> {
     })
 }
 
-/// The marks as transformers names them.
+/// The marks in the format of transformers.
 fn marks_json(pad: &str) -> Value {
     json!({
         "bos_token": START_MARK, "eos_token": END_MARK, "unk_token": END_MARK, "pad_token": pad,
@@ -176,7 +176,7 @@ fn clip_vocab(merges: &Merges) -> Vocab {
     tokens.chain(marks).zip(0..).collect()
 }
 
-/// Bytes with a printable character of their own in Latin-1, then the others.
+/// Bytes with a printable Latin-1 character, then the others.
 fn bytes_in_order() -> impl Iterator<Item = u8> {
     let has_own = |byte: &u8| has_own_symbol(*byte);
     let own = (0..=u8::MAX).filter(has_own);
@@ -187,13 +187,13 @@ fn has_own_symbol(byte: u8) -> bool {
     matches!(byte, b'!'..=b'~' | 0xA1..=0xAC | 0xAE..=0xFF)
 }
 
-/// The character that stands for a byte in the vocabulary: its own in Latin-1 where that is printable,
-/// else one from U+0100 on.
+/// The character that stands for a byte in the vocabulary: its own Latin-1 character if that is printable, else one
+/// from U+0100 on.
 fn byte_symbol(byte: u8) -> char {
     if has_own_symbol(byte) {
         return char::from(byte);
     }
-    // The 68 others are 0 to 32, 127 to 160 and 173, in that order.
+    // The 68 others, in order: 0 to 32, 127 to 160, and 173.
     let rank = match byte {
         0..=32 => u32::from(byte),
         127..=160 => u32::from(byte) - 127 + 33,
@@ -202,7 +202,7 @@ fn byte_symbol(byte: u8) -> char {
     char::from_u32(256 + rank).unwrap_or(char::REPLACEMENT_CHARACTER)
 }
 
-/// A word as the vocabulary spells it: one symbol for each byte.
+/// Spells a word in the vocabulary's symbols, one for each byte.
 pub(crate) fn to_symbols(word: &str) -> Cow<'_, str> {
     if word.bytes().all(|byte| byte.is_ascii_graphic()) {
         Cow::Borrowed(word)
@@ -246,7 +246,7 @@ mod tests {
         format!("#version: 0.2\n{}", embedded_merges().unwrap())
     }
 
-    /// Path and line that the error of a broken folder names.
+    /// Path, line and message of the error that a broken folder causes.
     fn broken_at(files: &[(&str, &str)]) -> (PathBuf, usize, String) {
         let folder = folder(files);
         match Tokenizer::from_folder(folder.path()).unwrap_err() {
@@ -430,7 +430,7 @@ mod tests {
         }
     }
 
-    /// What is written is read again as the same ids, words and padding.
+    /// A saved vocabulary is read back with the same ids, words and padding.
     #[test]
     fn a_saved_vocabulary_comes_back() {
         let saved = TempDir::new().unwrap();
@@ -480,8 +480,8 @@ mod tests {
     }
 
     proptest! {
-        /// A file cut short, or with one byte changed, is refused or read; it never panics, and the line
-        /// named is one of the file.
+        /// A file cut short, or with one byte changed, is read or refused without a panic; the line named in the
+        /// error exists in the file.
         #[test]
         fn damaged_files_are_refused_with_a_line_of_theirs(
             cut in 0..SMALL.len(), byte in 0..128_u8, shorten in any::<bool>()

@@ -1,4 +1,4 @@
-//! Reading vocabulary files, with the line where one is broken.
+//! Reads vocabulary files; errors name the broken line.
 
 use crate::error::{Error, Result};
 use serde::Deserialize;
@@ -21,16 +21,16 @@ pub(crate) fn read(path: &Path) -> Result<String> {
     })
 }
 
-/// The token ids of `vocab.json`: an object of token: id.
+/// Parses the token ids of `vocab.json`: an object of token: id.
 pub(crate) fn parse_vocab(path: &Path, text: &str) -> Result<Vocab> {
     let entries: HashMap<String, &RawValue> =
         serde_json::from_str(text).map_err(|e| json_error(path, &e))?;
     vocab_from(path, text, entries)
 }
 
-/// The merges of `merges.txt`: two tokens a line, most frequent pair first, after a line `#version`.
+/// Parses the merges of `merges.txt`: two tokens a line, most frequent pair first, after a line `#version`.
 ///
-/// With a vocabulary, both tokens and what they make must be in it.
+/// With a vocabulary, both tokens and their concatenation must be in it.
 pub(crate) fn parse_merges(path: &Path, text: &str, vocab: Option<&Vocab>) -> Result<Merges> {
     let mut merges = Merges::new();
     for (index, line) in text.trim_end().lines().enumerate() {
@@ -43,7 +43,7 @@ pub(crate) fn parse_merges(path: &Path, text: &str, vocab: Option<&Vocab>) -> Re
     Ok(merges)
 }
 
-/// Vocabulary and merges of `tokenizer.json`.
+/// Parses vocabulary and merges of `tokenizer.json`.
 pub(crate) fn parse_tokenizer(path: &Path, text: &str) -> Result<(Vocab, Merges)> {
     let file: TokenizerFile<'_> = serde_json::from_str(text).map_err(|e| json_error(path, &e))?;
     let mut vocab = vocab_from(path, text, file.model.vocab)?;
@@ -58,7 +58,7 @@ pub(crate) fn parse_tokenizer(path: &Path, text: &str) -> Result<(Vocab, Merges)
     Ok((vocab, merges))
 }
 
-/// The padding token of `special_tokens_map.json`, if it names one.
+/// Parses the padding token of `special_tokens_map.json`, if it names one.
 pub(crate) fn parse_pad(path: &Path, text: &str) -> Result<Option<String>> {
     let map: SpecialTokens = serde_json::from_str(text).map_err(|e| json_error(path, &e))?;
     Ok(map.pad_token.map(|token| match token {
@@ -100,7 +100,7 @@ enum SpecialToken {
     Object { content: String },
 }
 
-/// The ids of the entries, which must be whole numbers, each used once.
+/// Converts the ids of the entries, which must be unique whole numbers.
 fn vocab_from(path: &Path, text: &str, entries: HashMap<String, &RawValue>) -> Result<Vocab> {
     let mut entries: Vec<_> = entries.into_iter().collect();
     entries.sort_by_key(|(_, raw)| raw.get().as_ptr());
@@ -119,7 +119,7 @@ fn vocab_from(path: &Path, text: &str, entries: HashMap<String, &RawValue>) -> R
     Ok(vocab)
 }
 
-/// A merge in `tokenizer.json`: "left right", or a list of the two.
+/// Parses a merge of `tokenizer.json`: "left right", or a list of the two.
 fn merge_from(raw: &RawValue) -> std::result::Result<(String, String), String> {
     match (value::<(String, String)>(raw), value::<String>(raw)) {
         (Some(merge), _) => Ok(merge),
@@ -139,7 +139,7 @@ fn split_merge(line: &str) -> std::result::Result<(String, String), String> {
     }
 }
 
-/// Checks that a merge and what it makes are in the vocabulary.
+/// Checks that the tokens of a merge and their concatenation are in the vocabulary.
 fn known(
     (left, right): (String, String),
     vocab: Option<&Vocab>,

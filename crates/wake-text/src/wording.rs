@@ -6,11 +6,11 @@ use wake_physics::Scene;
 
 /// Wording of a prompt.
 ///
-/// All state the same values, and [`PartialScene::read`] reads all of them back. Different wordings
-/// keep a text encoder from memorising one sentence.
+/// All wordings state the same values, and [`PartialScene::read`] reads all of them back. Training on several keeps a
+/// text encoder from memorising one sentence.
 ///
-/// Of several ships they state how many there are, and speed and heading of the first: "wakes from 2 ships, the first
-/// moving at 10 mps toward 135 degrees". The number stays unread when the prompt is read back.
+/// With several ships they state the number of ships, and speed and heading of the first: "wakes from 2 ships, the
+/// first moving at 10 mps toward 135 degrees". The number stays unread when the prompt is read back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Wording {
     /// The words of Kamirul, Pappas and Achim:
@@ -50,8 +50,8 @@ impl Wording {
 
     /// The prompt of a scene: ASCII, at most 77 tokens.
     ///
-    /// Numbers are rounded as in [`PartialScene::of`]. Without a ship the prompt speaks of "open sea without
-    /// a ship"; where the wind rounds to 0 m/s, of "no wind", and states neither direction nor fetch.
+    /// Numbers are rounded as in [`PartialScene::of`]. Without a ship the prompt says "open sea without a ship";
+    /// where the wind rounds to 0 m/s it says "no wind" or "without wind" and states neither direction nor fetch.
     ///
     /// # Errors
     ///
@@ -100,7 +100,7 @@ pub fn prompt(scene: &Scene) -> Result<String> {
     Wording::Paper.prompt(scene)
 }
 
-/// How many ships there are, at least one; speed and heading of the first.
+/// Number of ships, at least one; speed and heading of the first.
 struct Ships {
     count: usize,
     speed: f64,
@@ -108,7 +108,7 @@ struct Ships {
 }
 
 impl Ships {
-    /// What to call the first ship: `alone`, or as one of several.
+    /// Name of the first ship: `alone`, or as one of several.
     fn first(&self, alone: &str, of_several: impl Fn(usize) -> String) -> String {
         match self.count {
             1 => alone.to_owned(),
@@ -204,7 +204,7 @@ mod tests {
     use wake_physics::reference::paper_grid;
     use wake_physics::scene::Ship;
 
-    /// Any valid ship, sea and radar, as far as a prompt speaks of them.
+    /// Valid scenes that vary in everything a prompt states.
     fn scenes() -> impl Strategy<Value = Scene> {
         let angle = || prop_oneof![-720.0..720.0_f64, prop::num::f64::NORMAL];
         let ship = prop::option::of((0.0..=40.0_f64, angle()));
@@ -227,14 +227,14 @@ mod tests {
         )
     }
 
-    /// Degrees between two directions, 0 to 180.
+    /// Angle between two directions, 0 to 180 degrees.
     fn turn(a: f64, b: f64) -> f64 {
         let turn = (a - b.rem_euclid(360.0)).rem_euclid(360.0);
         turn.min(360.0 - turn)
     }
 
-    /// Whether a value is what is left of another after rounding to a step: half a step away, and the few
-    /// units in the last place that the arithmetic itself may lose.
+    /// Whether `stated` is `value` rounded to `step`: at most half a step apart, plus a few units in the last place
+    /// for the arithmetic.
     fn is_rounded(stated: f64, value: f64, step: f64) -> bool {
         (stated - value).abs() <= 0.5 * step * (1.0 + 1e-12) + 1e-12 * value.abs()
     }
@@ -299,7 +299,7 @@ mod tests {
         }
     }
 
-    /// Two ships do not become one in silence: the number stays unread, and is all that does.
+    /// Several ships are not silently reduced to one: their number stays unread, and nothing else does.
     #[test]
     fn of_several_ships_the_number_and_the_first_are_stated() {
         for count in [2, 17, 100] {
@@ -316,7 +316,7 @@ mod tests {
                 assert_eq!(reading.scene, PartialScene::of(&scene), "{prompt}");
                 let unread: Vec<&str> = reading.unread.iter().map(|u| u.text.as_str()).collect();
                 assert_eq!(unread, [count.to_string()], "{prompt}");
-                // The others stay as they are.
+                // The other ships stay unchanged.
                 assert_eq!(reading.scene.onto(&scene).unwrap(), scene, "{prompt}");
             }
         }
@@ -383,7 +383,7 @@ mod tests {
         assert_eq!(Tokenizer::clip().encode(expected).token_count, 50);
     }
 
-    /// The examples in the documentation of each wording are its prompts of the paper's example.
+    /// Each documented example is the wording's prompt for the paper's example.
     #[test]
     fn the_documented_examples_are_true() {
         let scene = scene(&["ship.heading=135", "sea.wind_speed=3", "sea.fetch=10000"]);
@@ -444,7 +444,7 @@ mod tests {
                 .encode(&wording.prompt(&scene).unwrap())
                 .token_count
         });
-        // The paper's example has 50; these numbers are nine digits or points longer.
+        // The paper's example has 50; these numbers have nine more digits and points.
         assert_eq!(counts[0], 59);
         assert!(counts.iter().all(|&count| count <= TOKENS), "{counts:?}");
     }

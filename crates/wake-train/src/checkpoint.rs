@@ -1,12 +1,12 @@
-//! Everything a run needs to go on, as a folder that is either whole or not there.
+//! Checkpoints: everything needed to resume a run, in a folder that is either complete or absent.
 //!
 //! ```text
 //! FOLDER/step-00001200/state.json
 //! FOLDER/step-00001200/tensors.safetensors
 //! ```
 //!
-//! `state.json` has a checksum of the tensors, and of itself. Tensors are written and read one by one: a checkpoint takes no
-//! more memory than its largest tensor beside what it holds.
+//! `state.json` holds checksums of the tensor file and of itself. Tensors are written and read one by one, so the extra memory
+//! is at most that of the largest tensor.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -22,7 +22,7 @@ use whole_files::{entries, failed, file_checksum, sealed, unsealed};
 
 use crate::error::{Error, Result};
 
-/// The file of the tensors.
+/// Name of the tensor file.
 const TENSORS: &str = "tensors.safetensors";
 /// Tensors by name: shape and numbers.
 pub type Tensors = BTreeMap<String, (Vec<usize>, Vec<f32>)>;
@@ -34,17 +34,18 @@ pub struct Checkpoint {
     pub step: usize,
     /// Steps that changed the weights.
     pub applied: usize,
-    /// Whatever is no tensor.
+    /// Description of the run, compared when it is resumed.
     pub state: Value,
-    /// Weights, averages.
+    /// Weights, averaged weights and averages of the optimizer.
     pub tensors: Tensors,
 }
 
 impl Checkpoint {
-    /// Writes the checkpoint below a folder and removes all but the newest, and what killed runs left: a folder
-    /// belongs to one run and one process.
+    /// Writes the checkpoint below a folder and removes older ones.
     ///
-    /// - `keep`: checkpoints that stay, at least this one
+    /// Leftovers of killed runs are removed too: a folder belongs to one run and one process.
+    ///
+    /// - `keep`: number of checkpoints to keep, at least this one
     ///
     /// # Errors
     ///
@@ -59,7 +60,7 @@ impl Checkpoint {
             fs::rename(&temporary, &target)
         });
         if written.is_err() {
-            // The write failed already; what is left of it is the lesser trouble.
+            // The error of the write is reported, not that of the clean-up.
             fs::remove_dir_all(&temporary).ok();
         }
         written.map_err(|source| failed("write", &target, source))?;
@@ -72,7 +73,7 @@ impl Checkpoint {
         Ok(target)
     }
 
-    /// What keeps a run of this `state` from going on here, if anything does.
+    /// Error that prevents a run of this `state` from resuming here, if any.
     pub(super) fn differs(&self, state: &Value) -> Option<Error> {
         let (key, there, here) = difference("", &self.state, state)?;
         Some(Error::Value(wake_nn::Error::InvalidOption {
@@ -106,8 +107,8 @@ impl Checkpoint {
     ///
     /// # Errors
     ///
-    /// [`Error::Data`] with the file whose checksum does not fit, [`wake_nn::Error::Io`] or [`wake_nn::Error::InvalidSafetensors`] for a
-    /// checkpoint that cannot be read.
+    /// [`Error::Data`] with the file whose checksum does not match, [`wake_nn::Error::Io`] or
+    /// [`wake_nn::Error::InvalidSafetensors`] for a checkpoint that cannot be read.
     pub fn newest(folder: &Path) -> Result<Option<Self>> {
         match checkpoints(folder)?.pop() {
             None => Ok(None),
@@ -163,11 +164,11 @@ struct State {
     step: usize,
     applied: usize,
     state: Value,
-    /// Checksum of the file of the tensors.
+    /// Checksum of the tensor file.
     tensors: String,
 }
 
-/// The error for a file whose content is not what was written.
+/// Error for a file that is missing or whose checksum does not match.
 fn damaged(file: &Path) -> Error {
     let folder = file.parent().unwrap_or(file);
     Error::Data(wake_dataset::Error::Dataset {
@@ -202,7 +203,7 @@ pub(super) fn difference(path: &str, a: &Value, b: &Value) -> Option<(String, St
     }
 }
 
-/// A value in a few words.
+/// Value as text for a message, at most 80 characters.
 fn short(value: &Value) -> String {
     match value {
         Value::Null => "nothing".to_owned(),
@@ -210,7 +211,7 @@ fn short(value: &Value) -> String {
     }
 }
 
-/// Removes checkpoints half-written.
+/// Removes half-written checkpoints.
 fn sweep(folder: &Path) -> Result<()> {
     for path in entries(folder)? {
         if whole_files::is_temporary(&path) {
@@ -239,7 +240,7 @@ fn checkpoints(folder: &Path) -> Result<Vec<(usize, PathBuf)>> {
     Ok(found)
 }
 
-/// A tensor that is turned into bytes when it is written.
+/// Tensor that is converted to bytes only when it is written.
 struct Numbers<'a> {
     shape: &'a [usize],
     numbers: &'a [f32],
@@ -308,7 +309,7 @@ mod tests {
     fn half_a_checkpoint_is_none() {
         let folder = tempfile::tempdir().unwrap();
         checkpoint(7).write(folder.path(), 2).unwrap();
-        // What a killed run leaves behind has another name.
+        // A killed run leaves a folder of another name.
         let half = folder.path().join(".step-00000009.1.tmp");
         fs::create_dir(&half).unwrap();
         assert_eq!(
@@ -327,7 +328,7 @@ mod tests {
         );
     }
 
-    /// Any bit of any file, and a file that is missing; the message says how to go on, and that goes on.
+    /// Flips a bit in each byte of each file, and removes a file; following the message's advice makes the run resumable.
     #[test]
     fn a_damaged_checkpoint_is_refused_by_the_name_of_its_file() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! The one error of this crate.
+//! The crate's error type.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[expect(missing_docs, reason = "the message names every field")]
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// An option, a file or a device that does not fit.
+    /// An option, file or device is invalid.
     #[error(transparent)]
     Value(#[from] wake_nn::Error),
 
@@ -34,11 +34,11 @@ pub enum Error {
     #[error(transparent)]
     Text(#[from] wake_text::Error),
 
-    /// Labels of another form than that of `labels.json`.
+    /// A `labels.json` does not have the expected form.
     #[error("{}: {message}", path.display())]
     Labels { path: PathBuf, message: String },
 
-    /// Training went astray.
+    /// Training diverged.
     #[error("training diverged at step {step}: {what}; lower the rate, or look at the data")]
     Diverged { step: usize, what: String },
 }

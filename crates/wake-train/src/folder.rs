@@ -1,4 +1,4 @@
-//! The folder of a run: of one model, one data set and one process.
+//! The folder of a run: one model, one data set, one process.
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ use whole_files::FolderLock;
 use super::checkpoint::{Checkpoint, difference};
 use crate::error::{Error, Result};
 
-/// A folder that the stages of one run share, taken for this process.
+/// Folder shared by the stages of one run, locked for this process.
 ///
 /// ```text
 /// config.json      the model
@@ -23,10 +23,10 @@ pub(crate) struct RunFolder {
     _lock: FolderLock,
 }
 
-/// Where the checkpoints of all stages lie in it.
+/// Subfolder of the checkpoints of all stages.
 const CHECKPOINTS: &str = "checkpoints";
 
-/// How far the results of a stage are.
+/// Recorded steps of a stage: those its results were made after, and those requested.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Noted {
     step: usize,
@@ -34,16 +34,16 @@ struct Noted {
 }
 
 impl RunFolder {
-    /// Opens or makes the folder of a run; what is refused changes nothing.
+    /// Opens or makes the folder of a run; a refused folder is left unchanged.
     ///
-    /// - `model`: what shapes it
-    /// - `data`: what is learnt from, such as the manifest of a data set; `Null` for a stage that needs none
-    /// - `stage`: the one that shall begin, or be resumed
+    /// - `model`: configuration of the model
+    /// - `data`: identity of the training data, such as the manifest of a data set; `Null` for a stage that needs none
+    /// - `stage`: stage to begin, or to resume
     ///
     /// # Errors
     ///
     /// [`wake_nn::Error::InvalidOption`] with the first value in which the folder's model or data differ, or as
-    /// [`begin`](Self::begin); [`Error::Scene`] if another process works there.
+    /// [`begin`](Self::begin); [`wake_nn::Error::Io`] if another process works there.
     pub(crate) fn open(
         path: &Path,
         model: &impl Serialize,
@@ -74,36 +74,37 @@ impl RunFolder {
         Ok(folder)
     }
 
-    /// Where it is.
+    /// Path of the folder.
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Where the checkpoints of a stage lie.
+    /// Folder of the checkpoints of a stage.
     pub(crate) fn checkpoints(&self, stage: &str) -> PathBuf {
         self.path.join(CHECKPOINTS).join(stage)
     }
 
-    /// The checkpoint that a stage goes on from, or none for one that begins.
+    /// Returns the checkpoint to resume a stage from, or `None` for a stage that begins.
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::InvalidOption`] when there is none to resume, or one that a new beginning would lose.
+    /// [`wake_nn::Error::InvalidOption`] when there is no checkpoint to resume, or one that a new beginning would lose.
     pub(crate) fn begin(&self, stage: &str, resume: bool) -> Result<Option<Checkpoint>> {
         check_begin(&self.path, &self.checkpoints(stage), stage, resume)?;
         Checkpoint::newest(&self.checkpoints(stage))
     }
 
-    /// Whether the results of a stage are there, and were made after `step` steps.
+    /// Whether the results of a stage exist and were made after `step` steps.
     ///
-    /// - `results`: names of its files
+    /// - `results`: names of the stage's files
     pub(crate) fn is_current(&self, stage: &str, step: usize, results: &[&str]) -> bool {
         let there = results.iter().all(|name| self.path.join(name).is_file());
         there && self.noted(stage).is_some_and(|noted| noted.step == step)
     }
 
-    /// Steps that a stage was begun for and has not made, or whose results are missing or older than its last
-    /// checkpoint: `None` where nothing is left to do, `Some(0)` where it never began.
+    /// Number of steps that an unfinished stage was begun for; `None` if it is finished, `Some(0)` if it never began.
+    ///
+    /// A stage whose results are missing or older than its last checkpoint is unfinished.
     ///
     /// # Errors
     ///
@@ -112,18 +113,18 @@ impl RunFolder {
         let there = results.iter().all(|name| self.path.join(name).is_file());
         let newest = Checkpoint::newest_step(&self.checkpoints(stage))?;
         Ok(match (newest, self.noted(stage)) {
-            // Results that were put there, or whose checkpoints were removed.
+            // Results were copied there, or their checkpoints were removed.
             (None, _) => (!there).then_some(0),
             (Some(step), Some(noted)) if there && noted.step == step && step >= noted.of => None,
             (Some(step), noted) => Some(noted.map_or(0, |noted| noted.of).max(step)),
         })
     }
 
-    /// Notes what a stage shall do, and after how many steps its results were made.
+    /// Records the steps of a stage: those its results were made after, and those requested.
     ///
     /// # Errors
     ///
-    /// [`Error::Scene`] if it cannot be written.
+    /// [`wake_nn::Error::Io`] if it cannot be written.
     pub(crate) fn note(&mut self, stage: &str, step: usize, of: usize) -> Result<()> {
         let stages = self.record.entry("stages").or_insert_with(|| json!({}));
         stages[stage] = json!({"results_after": step, "steps": of});
@@ -147,7 +148,7 @@ impl RunFolder {
     }
 }
 
-/// Whether a folder is free, or of this model and data.
+/// Checks that a folder is free or belongs to this model and data.
 fn compare(path: &Path, model: &Value, data: &Value) -> Result<()> {
     let refuse = |file: &str, (key, there, here): (String, String, String)| {
         Error::Value(wake_nn::Error::InvalidOption {
@@ -171,10 +172,10 @@ fn compare(path: &Path, model: &Value, data: &Value) -> Result<()> {
     }
 }
 
-/// Refuses to resume what never began, and to begin what has begun.
+/// Refuses to resume a stage that never began, and to begin one that has checkpoints.
 ///
 /// - `path`: the folder of the run
-/// - `checkpoints`: where those of the stage lie
+/// - `checkpoints`: folder of the stage's checkpoints
 pub(super) fn check_begin(
     path: &Path,
     checkpoints: &Path,
@@ -199,7 +200,7 @@ pub(super) fn check_begin(
     }
 }
 
-/// A JSON object; `None` if there is no such file.
+/// Reads a JSON object; `None` if there is no such file.
 fn read(path: &Path) -> Result<Option<Map<String, Value>>> {
     if !path.exists() {
         return Ok(None);

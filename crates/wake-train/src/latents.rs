@@ -1,4 +1,4 @@
-//! Examples to learn from, as latents in memory.
+//! Training examples as latents in memory.
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
@@ -15,25 +15,25 @@ use wake_ldm::network::{
 
 /// Images read or simulated at the same time.
 const AT_ONCE: u64 = 64;
-/// The patch transform is fitted to what images have beyond the expected ones, each brought to this deviation of grey, if it
-/// is not below the least.
+/// The patch transform is fitted to residuals of grey, image less expected image, each scaled to this standard deviation;
+/// those with less than the least deviation are scaled as if they had that.
 const DEVIATION: f32 = 0.05;
 const LEAST_DEVIATION: f32 = 1e-3;
 /// Examples whose residuals are computed at once.
 const RESIDUALS: usize = 8;
 
-/// One example beside its latents.
+/// Data of an example besides its latents.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Example {
     /// The scene that made the image.
     pub scene: Scene,
-    /// Mean grey of the image less that of the expected one.
+    /// Mean grey of the image less that of the expected image.
     pub grey: f32,
-    /// Of the sea in the channels, see [`PhysicsPrior`].
+    /// Log standard deviations of the sea in the channels, see [`PhysicsPrior`].
     pub log_deviations: Vec<f32>,
 }
 
-/// Latents of many images and of the images expected of their scenes, 16 bits a number.
+/// Latents of many images and of the expected images of their scenes, 16 bits per number.
 #[derive(Debug, Default)]
 pub(crate) struct LatentSet {
     shape: [usize; 3],
@@ -42,10 +42,10 @@ pub(crate) struct LatentSet {
     examples: Vec<Example>,
 }
 
-/// The patch transform that keeps most of what the first images of a source have beyond the expected ones, and what it keeps.
+/// Fits the patch transform to residuals of the first images of a source, and returns it with the variance it explains.
 ///
-/// - `config`: shapes the transform, and has the mapping of grey that the images have
-/// - `done`: called with a number of images when they were read
+/// - `config`: size of the transform, and grey mapping of the images
+/// - `done`: called with the number of images after each batch is read
 ///
 /// # Errors
 ///
@@ -69,7 +69,7 @@ pub(crate) fn fit_patches(
     Ok(PatchTransform::fit(pixels, size, channels, device))
 }
 
-/// What an image has beyond the expected one, brought to one deviation.
+/// Residual of an image from the expected one, scaled to the standard deviation `DEVIATION`.
 fn beyond(pair: Pair, config: &WakeModelConfig) -> Result<Vec<f32>> {
     let expected = expected_grey(&pair.scene, &config.grey)?;
     let mut left = pair.image.pixels;
@@ -85,9 +85,9 @@ fn beyond(pair: Pair, config: &WakeModelConfig) -> Result<Vec<f32>> {
 }
 
 impl LatentSet {
-    /// The latents of the first pairs of a source, and what physics foresees of their scenes.
+    /// Encodes the first pairs of a source and the expected images of their scenes.
     ///
-    /// - `done`: called with a number of pairs when they are in the set
+    /// - `done`: called with the number of pairs after each batch
     ///
     /// # Errors
     ///
@@ -115,20 +115,20 @@ impl LatentSet {
         Ok(set)
     }
 
-    /// Memory that the latents of so many pairs take \[bytes\].
+    /// Memory of the latents of `pairs` pairs \[bytes\].
     pub(crate) fn bytes(config: &WakeModelConfig, pairs: u64) -> u64 {
-        // Two numbers of 16 bits for each of the latents of an image.
+        // Image and expected image: two 16-bit numbers per latent.
         let each = 4 * config.latent_channels * config.latent_size().pow(2);
         pairs.saturating_mul(each as u64)
     }
 
     /// Encodes images on all cores and adds them in order.
     ///
-    /// - `pairs`: grey of a scene's pixels in rows, what physics says of the scene, and the scene
+    /// - `pairs`: grey of an image row by row, the physics prior of its scene, and the scene
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::InvalidOption`] for an image that is not square, or of another size than its grid or those before.
+    /// [`wake_nn::Error::InvalidOption`] for an image that is not square, or whose size differs from its grid or earlier images.
     pub(crate) fn extend(
         &mut self,
         transform: &PatchTransform,
@@ -174,9 +174,9 @@ impl LatentSet {
         Ok(())
     }
 
-    /// The residuals of the latents about the mean and spread that a prior expects; computed on all cores.
+    /// Residuals of the latents from the mean and spread of a prior, computed on all cores.
     ///
-    /// - `done`: called with a number of examples when they are done, from several threads
+    /// - `done`: called from several threads with the number of examples just done
     pub(crate) fn residuals(&self, prior: &Prior, done: impl Fn(usize) + Sync) -> Self {
         let all: Vec<usize> = (0..self.len()).collect();
         let chunks: Vec<&[usize]> = all.chunks(RESIDUALS).collect();
@@ -215,13 +215,13 @@ impl LatentSet {
         &self.examples[index]
     }
 
-    /// Some of the scenes.
+    /// Scenes of some examples.
     pub(super) fn scenes(&self, indices: &[usize]) -> Vec<Scene> {
         let scenes = indices.iter().map(|&i| &self.examples[i].scene);
         scenes.cloned().collect()
     }
 
-    /// Deviations in the channels of some examples, one after the other.
+    /// Log standard deviations of the channels of some examples, concatenated.
     pub(super) fn log_deviations(&self, indices: &[usize]) -> Vec<f32> {
         let examples = indices.iter().map(|&i| &self.examples[i]);
         examples
@@ -230,7 +230,7 @@ impl LatentSet {
             .collect()
     }
 
-    /// What is known of some examples.
+    /// Conditioning inputs of some examples.
     pub(crate) fn inputs(&self, indices: &[usize], device: &Device) -> ConditioningInputs {
         let wake = self.expected(indices, device);
         ConditioningInputs::new(&self.scenes(indices), wake, &self.log_deviations(indices))
@@ -241,7 +241,7 @@ impl LatentSet {
         self.some(&self.latents, index, cells)
     }
 
-    /// The same pixels of the image expected of its scene.
+    /// The same pixels of the expected image.
     pub(super) fn expected_pixels(&self, index: usize, cells: &[usize]) -> Vec<f32> {
         self.some(&self.expected, index, cells)
     }
@@ -251,7 +251,7 @@ impl LatentSet {
         batch(&self.latents, self.shape, indices, device)
     }
 
-    /// Latents of the images expected of their scenes.
+    /// Latents of the expected images of some examples.
     pub(crate) fn expected(&self, indices: &[usize], device: &Device) -> Tensor<4> {
         batch(&self.expected, self.shape, indices, device)
     }
@@ -265,7 +265,7 @@ impl LatentSet {
     }
 }
 
-/// Some of many images of one shape, `[indices, channels, rows, columns]`.
+/// Batch of selected images of one shape, `[indices, channels, rows, columns]`.
 pub(super) fn batch(
     images: &[f16],
     [channels, rows, columns]: [usize; 3],

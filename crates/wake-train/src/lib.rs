@@ -4,7 +4,7 @@
 mod error;
 mod streams;
 
-// Loop.
+// Training loop.
 mod tensors;
 mod self_check;
 mod checkpoint;
@@ -15,7 +15,7 @@ mod log;
 mod trainer;
 mod folder;
 
-// What is learnt.
+// Training data and tasks.
 mod latents;
 mod pairs;
 mod prompts;
@@ -23,7 +23,7 @@ mod run;
 mod sea;
 mod tasks;
 
-// Runs in their folders.
+// Training stages, each in a run folder.
 mod fine_tune;
 mod sheet;
 mod stage;
@@ -33,7 +33,7 @@ mod small_pipeline;
 mod sea_training;
 mod wake_model;
 
-// Figures.
+// Evaluation.
 pub mod metrics;
 mod two_sample;
 pub mod evaluation;

@@ -1,4 +1,4 @@
-//! What a run reports: one JSON object a line, and how long it still takes.
+//! Training log: one JSON object per line, with an estimate of the time left.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::Write;
@@ -21,13 +21,13 @@ pub struct TrainLog {
 }
 
 impl TrainLog {
-    /// Opens a log to go on after `step` steps; lines of later steps, which a killed run wrote after its last
-    /// checkpoint, are dropped.
+    /// Opens a log to continue after `step` steps.
+    ///
+    /// Lines of later steps, which a killed run wrote after its last checkpoint, are dropped.
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::Io`] when the file cannot be read or written, [`Error::Data`] with the number of a line that is none
-    /// of a log.
+    /// [`wake_nn::Error::Io`] when the file cannot be read or written, [`Error::Data`] with the number of an invalid line.
     pub fn open(path: &Path, step: usize) -> Result<Self> {
         let io = |source| failed("write", path, source);
         if let Some(folder) = path.parent() {
@@ -43,7 +43,7 @@ impl TrainLog {
         })
     }
 
-    /// Writes the line of a step that ended with `step` steps made, and returns it.
+    /// Writes and returns the log line of step number `step`, counted from 1.
     ///
     /// # Errors
     ///
@@ -70,7 +70,7 @@ impl TrainLog {
     }
 }
 
-/// The lines of the first `step` steps; half a line at the end, which a kill left, is dropped.
+/// Returns the lines of the first `step` steps, without the incomplete last line that a killed run leaves.
 fn kept_lines(path: &Path, step: usize) -> Result<String> {
     let bytes = match whole_files::read_regular(path) {
         Ok(bytes) => bytes,

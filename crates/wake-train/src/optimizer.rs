@@ -1,9 +1,9 @@
-//! Steps against a gradient: their size, Adam, and the average of the weights they lead through.
+//! Learning-rate schedule, `AdamW` and EMA.
 
 use burn::optim::{AdamW, AdamWConfig, AdamWState, AdaptiveMomentumState, Optimizer};
 use burn::tensor::Tensor;
 
-/// Warm-up, then half a cosine down to a tenth.
+/// Learning-rate schedule: linear warm-up, then half a cosine down to a tenth of the peak.
 ///
 /// ```text
 /// η(s) = peak · (s + 1)/warmup                                       s < warmup
@@ -15,7 +15,7 @@ use burn::tensor::Tensor;
 /// Loshchilov & Hutter (2017), "SGDR: Stochastic Gradient Descent with Warm Restarts", Eq. 5.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LrSchedule {
-    /// The largest step.
+    /// Largest learning rate.
     pub peak: f64,
     /// Steps of the warm-up.
     pub warmup: usize,
@@ -24,7 +24,7 @@ pub struct LrSchedule {
 }
 
 impl LrSchedule {
-    /// The rate of step number `step`, counted from 0.
+    /// Learning rate of step number `step`, counted from 0.
     pub fn at(&self, step: usize) -> f64 {
         if step < self.warmup {
             return self.peak * (step + 1) as f64 / self.warmup as f64;
@@ -38,13 +38,13 @@ impl LrSchedule {
 /// Constants of `Adam`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AdamOptions {
-    /// β₁, how long gradients are remembered.
+    /// β₁, decay rate of the average of gradients.
     pub beta_1: f64,
-    /// β₂, how long their squares are.
+    /// β₂, decay rate of the average of their squares.
     pub beta_2: f64,
     /// ε in the denominator.
     pub epsilon: f64,
-    /// Decay λ of the weights.
+    /// Weight decay λ.
     pub weight_decay: f64,
 }
 
@@ -59,7 +59,7 @@ impl Default for AdamOptions {
     }
 }
 
-/// Adam with decoupled weight decay: burn's, with a state that can be stored beside the weights.
+/// Adam with decoupled weight decay (burn's), with a state that can be stored beside the weights.
 ///
 /// ```text
 /// m ← β₁ m + (1 − β₁) g,    v ← β₂ v + (1 − β₂) g²
@@ -77,7 +77,7 @@ pub(super) struct Adam {
 }
 
 impl Adam {
-    /// An optimizer of so many parameters that has not made a step.
+    /// New optimizer of `parameters` parameters.
     pub(super) fn new(options: AdamOptions, parameters: usize) -> Self {
         let rule = AdamWConfig::new()
             .with_beta_1(options.beta_1 as f32)
@@ -91,7 +91,7 @@ impl Adam {
         }
     }
 
-    /// An optimizer as it was after some steps, with its averages m and v.
+    /// Optimizer restored after `steps` steps from its averages m and v.
     pub(super) fn resumed(
         options: AdamOptions,
         [first, second]: [Vec<Tensor<1>>; 2],
@@ -119,7 +119,7 @@ impl Adam {
         [of(|state| &state.moment_1), of(|state| &state.moment_2)]
     }
 
-    /// The parameters after one step of size `rate` against `gradients · scale`.
+    /// Returns the parameters after one step of learning rate `rate` on `gradients · scale`.
     pub(super) fn step(
         &mut self,
         parameters: Vec<Tensor<1>>,
@@ -149,12 +149,12 @@ impl std::fmt::Debug for Adam {
 /// a ← d a + (1 − d) w,    d = min(decay, 1 − (1 + step)^(−2/3))
 /// ```
 ///
-/// The decay starts low, so that the first weights, which know nothing, are soon forgotten.
+/// The decay starts low, so that the initial weights are soon forgotten.
 ///
 /// # References
 ///
 /// Karras et al. (2024), "Analyzing and Improving the Training Dynamics of Diffusion Models", section 3. The start
-/// is the one of diffusers' `EMAModel`.
+/// follows diffusers' `EMAModel`.
 #[derive(Debug, Clone)]
 pub(super) struct Average {
     values: Vec<Tensor<1>>,
@@ -177,7 +177,7 @@ impl Average {
         self.decay.min(1.0 - (1.0 + step as f64).powf(-2.0 / 3.0))
     }
 
-    /// Takes in the weights after step number `step`, counted from 1.
+    /// Updates the average with the weights after step number `step`, counted from 1.
     pub(super) fn update(&mut self, weights: &[Tensor<1>], step: usize) {
         let decay = self.decay(step);
         for (average, weight) in self.values.iter_mut().zip(weights) {
@@ -214,7 +214,7 @@ mod tests {
         }
     }
 
-    /// Algorithm 2 in plain numbers of 64 bits; after three steps the optimizer is stored and comes back.
+    /// Compares with algorithm 2 in 64-bit numbers; after three steps the optimizer is stored and restored.
     #[test]
     fn steps_are_those_of_the_algorithm_also_after_a_restart() {
         let options = AdamOptions::default();
@@ -243,7 +243,7 @@ mod tests {
         }
         let found: Vec<f64> = weights[0].to_data().iter::<f64>().collect();
         for (a, [b, ..]) in found.iter().zip(&numbers) {
-            // Six steps of a few roundings of f32 of numbers up to 3; 1 − β₂ᵗ is known to 1e-5 at t = 1.
+            // Six steps with a few f32 roundings each of numbers up to 3; 1 − β₂ᵗ is known to 1e-5 at t = 1.
             assert!(
                 (a - b).abs() < 6.0 * 4.0 * 3.0 * f64::from(f32::EPSILON) + 1e-7,
                 "{a} {b}"

@@ -1,4 +1,4 @@
-//! The pairs that a run learns from, on disk or simulated.
+//! Training pairs, on disk or simulated.
 
 use std::ops::Range;
 
@@ -10,7 +10,7 @@ use wake_dataset::{Folder, Manifest, Pair, Recipe, Simulated, Source};
 use wake_ldm::conditioning::Vocabulary;
 use wake_ldm::network::{TrainingRanges, WakeModelConfig};
 
-/// So many pairs of a source, and what a run notes of them.
+/// A number of pairs of a source, and their identity for the record of a run.
 #[derive(Debug)]
 pub struct TrainingPairs {
     pairs: Pairs,
@@ -35,7 +35,7 @@ impl TrainingPairs {
         }
     }
 
-    /// The first `count` of a recipe and a seed, simulated when they are asked for.
+    /// The first `count` pairs of a recipe and a seed, simulated on demand.
     ///
     /// # Errors
     ///
@@ -79,18 +79,18 @@ impl TrainingPairs {
         self.count
     }
 
-    /// Whether there is none.
+    /// Whether there are no pairs.
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
 
-    /// Identity of the pairs, as a run notes it.
+    /// Identity of the pairs, for the record of a run.
     #[must_use]
     pub fn identity(&self) -> Value {
         json!({"set": self.set, "shard": self.set.shard})
     }
 
-    /// The wake model of standard widths for these pairs: of their grey, their pixels, and the scenes that there are.
+    /// Configuration of a wake model of standard widths with the grey mapping, pixels and scene ranges of these pairs.
     ///
     /// # Errors
     ///

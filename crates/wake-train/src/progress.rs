@@ -1,43 +1,43 @@
-//! What a training tells while it works.
+//! Progress messages of a training.
 
-/// One message of a training to whoever watches it.
+/// Progress message of a training.
 ///
-/// Every piece of work begins with [`Begin`](Self::Begin) and ends with [`End`](Self::End) or [`Made`](Self::Made); no two are
-/// under way at the same time.
+/// Every piece of work begins with [`Begin`](Self::Begin) and ends with [`End`](Self::End) or [`Made`](Self::Made); they do
+/// not overlap.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Progress {
     /// Work begins.
     Begin {
-        /// What is counted, such as `pairs`; of a stage its name.
+        /// Name of what is counted, such as `pairs`, or of the stage.
         what: &'static str,
-        /// How much of it there is.
+        /// Total count.
         of: u64,
     },
-    /// So much more was done; may come from several threads.
+    /// This many more are done; may come from several threads.
     More(u64),
     /// A step of a stage was made.
     Step {
-        /// Steps made so far, those of earlier runs included.
+        /// Steps made so far, including those of earlier runs.
         step: usize,
-        /// The loss of this one.
+        /// Loss of this step.
         loss: f64,
     },
     /// Work other than a stage has ended.
     End,
     /// A stage has made all its steps, and its results are written.
     Made {
-        /// Its name.
+        /// Name of the stage.
         stage: &'static str,
-        /// Steps in all.
+        /// Total number of steps.
         steps: usize,
     },
 }
 
-/// Runs work that counts what it does.
+/// Runs a piece of work and reports its progress.
 ///
-/// - `of`: how much there is to do
-/// - `work`: is given what it calls with every number of things that were done
+/// - `of`: total count
+/// - `work`: receives a function to call with the number of items just done
 pub(super) fn counted<T>(
     what: &'static str,
     of: u64,

@@ -1,4 +1,4 @@
-//! Endless prompts, and what they state.
+//! Random prompts and the values they state.
 
 use crate::error::Result;
 use crate::streams;
@@ -6,14 +6,14 @@ use wake_dataset::Simulated;
 use wake_nn::noise::NoiseSource;
 use wake_text::{PartialScene, Wording};
 
-/// Draws of one prompt.
+/// Random numbers per prompt.
 const DRAWS: u64 = 8;
-/// Part of the prompts whose sentences are moved about.
+/// Share of the prompts whose sentences are rearranged.
 const MOVED: f64 = 0.5;
-/// Part of the moved sentences that are left out.
+/// Share of the sentences left out of rearranged prompts.
 const LEFT_OUT: f64 = 0.2;
 
-/// Prompts of random scenes in every wording, half of them with sentences moved or left out.
+/// Prompts of random scenes in every wording; half of them have sentences rearranged or left out.
 #[derive(Debug, Clone)]
 pub(crate) struct Prompts {
     scenes: Simulated,
@@ -25,7 +25,7 @@ impl Prompts {
         Self { scenes }
     }
 
-    /// Prompt number `position`, and what it states as [`wake_text`] reads it.
+    /// Prompt number `position`, and the values that [`wake_text`] reads from it.
     ///
     /// # Errors
     ///
@@ -45,9 +45,9 @@ impl Prompts {
     }
 }
 
-/// The sentences of a prompt in another order, some of them left out.
+/// Shuffles the sentences of a prompt and leaves some out.
 ///
-/// - `draw`: number i of a few uniform numbers
+/// - `draw`: returns uniform number i
 fn rearranged(text: &str, draw: impl Fn(u64) -> f64) -> String {
     let sentences = text.trim_end_matches('.').split(". ");
     let mut kept: Vec<(f64, &str)> = sentences
@@ -83,7 +83,8 @@ mod tests {
             texts.insert(text);
         }
         assert!(texts.len() > 190, "{}", texts.len());
-        // Half of three quarters have sentences, of which a fifth is left out: 15 expected.
+        // Three quarters of the wordings have sentences, half of these prompts are rearranged, a fifth of their sentences is
+        // left out: 15 of 200 expected.
         assert!((3..40).contains(&gaps), "{gaps}");
     }
 

@@ -1,4 +1,4 @@
-//! A run: one part of a model learns one task, step by step, and can be stopped and continued.
+//! A run: the training of one part of a model on one task, which can be stopped and resumed.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -13,33 +13,33 @@ use super::self_check::check_once;
 use super::trainer::{StepReport, Trainer, TrainerOptions};
 use crate::error::{Error, Result};
 
-/// Parts of a loss by name.
+/// Terms of a loss by name.
 pub type Terms = Vec<(&'static str, f64)>;
 
 /// Training task of a part of a model.
 ///
-/// Step s takes the positions s · batch … (s + 1) · batch − 1, however many devices and parts share them: what is drawn for a
-/// position follows from the position alone.
+/// Step s takes the positions s · batch … (s + 1) · batch − 1, however many devices and parts share them: all random numbers
+/// of a position depend on the position alone.
 pub trait Task<M>: Sync {
-    /// What a loss is computed from.
+    /// Data that the loss is computed from.
     type Batch: Send + Sync;
 
-    /// Reads or makes what the loss needs at some positions.
+    /// Reads or makes the data of some positions.
     ///
-    /// A stage calls it for the next step while the model learns from this one.
+    /// A stage calls it for the next step while the model trains on the current one.
     ///
     /// # Errors
     ///
-    /// Those of the data; they end the run.
+    /// Errors of the data; they end the run.
     fn batch(&self, positions: Range<u64>) -> Result<Self::Batch>;
 
     /// The mean loss over a batch, and its terms.
     ///
-    /// - `device`: of the model, in autodiff
+    /// - `device`: autodiff device of the model
     fn loss(&self, model: &M, device: &Device, batch: &Self::Batch) -> (Tensor<1>, Terms);
 }
 
-/// How steps cut positions into parts.
+/// How the positions of a step are divided into parts.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Parts {
     batch: usize,
@@ -47,7 +47,7 @@ pub(super) struct Parts {
 }
 
 impl Parts {
-    /// What a task needs for a step, part by part.
+    /// Batches of a step, part by part.
     pub(super) fn of_step<M, T: Task<M>>(self, task: &T, step: usize) -> Result<Vec<T::Batch>> {
         let each = (self.batch / self.parts) as u64;
         let first = (step * self.batch) as u64;
@@ -61,22 +61,22 @@ impl Parts {
 /// Constants of a [`Run`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunOptions {
-    /// Examples of a batch.
+    /// Examples in a batch.
     pub batch: usize,
-    /// Seed of everything that is drawn.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// Identity of the training data, such as the manifest of a data set: a checkpoint of another is refused.
+    /// Identity of the training data, such as the manifest of a data set; a checkpoint with another is refused.
     pub identity: Value,
-    /// The loop.
+    /// Options of the training loop.
     pub trainer: TrainerOptions,
 }
 
 impl RunOptions {
-    /// Checks that batches can be cut and steps be made.
+    /// Checks the options, and that batches can be divided evenly.
     ///
     /// # Errors
     ///
-    /// As [`TrainerOptions::validate`], and [`wake_nn::Error::InvalidOption`] for a batch that cannot be cut evenly.
+    /// As [`TrainerOptions::validate`], and [`wake_nn::Error::InvalidOption`] for a batch that cannot be divided evenly.
     pub fn validate(&self, devices: usize) -> Result<()> {
         self.trainer.validate()?;
         let parts = devices * self.trainer.grad_accumulation_steps;
@@ -100,16 +100,16 @@ pub struct Run<M> {
 }
 
 impl<M: Module> Run<M> {
-    /// A run from random weights.
+    /// Run that starts from random weights.
     ///
-    /// - `part`: which part of a model learns; a checkpoint of another part is refused
-    /// - `model`: what shapes it
+    /// - `part`: name of the part that is trained; a checkpoint of another part is refused
+    /// - `model`: configuration of the model
     /// - `init`: draws its weights
     /// - `devices`: autodiff devices, at least one; each takes its share of every batch
     ///
     /// # Errors
     ///
-    /// As [`RunOptions::validate`]; [`wake_nn::Error::WrongNumbers`] for a device that is no CPU and fails
+    /// As [`RunOptions::validate`]; [`wake_nn::Error::WrongNumbers`] for a device other than a CPU that fails
     /// [`self_check`](crate::self_check).
     pub fn of(
         part: &str,
@@ -132,7 +132,7 @@ impl<M: Module> Run<M> {
         })
     }
 
-    /// Goes on where a checkpoint left off.
+    /// Resumes from a checkpoint.
     ///
     /// # Errors
     ///
@@ -141,11 +141,11 @@ impl<M: Module> Run<M> {
         self.trainer.restore(checkpoint, &self.state)
     }
 
-    /// Writes a checkpoint, and keeps some of the newest.
+    /// Writes a checkpoint and keeps the newest `keep`.
     ///
     /// # Errors
     ///
-    /// [`Error::Diverged`] for weights that are no finite numbers, else as [`Checkpoint::write`].
+    /// [`Error::Diverged`] for weights that are not finite, else as [`Checkpoint::write`].
     pub fn checkpoint(&self, folder: &Path, keep: usize) -> Result<PathBuf> {
         self.trainer.checkpoint(&self.state)?.write(folder, keep)
     }
@@ -160,7 +160,7 @@ impl<M: Module> Run<M> {
         self.trainer.averaged()
     }
 
-    /// How its steps cut positions into parts.
+    /// How the positions of its steps are divided into parts.
     pub(super) fn parts(&self) -> Parts {
         Parts {
             batch: self.options.batch,
@@ -168,7 +168,7 @@ impl<M: Module> Run<M> {
         }
     }
 
-    /// One step on the next batch; the terms are means over the batch.
+    /// Makes one step on the next batch; the terms are means over the batch.
     ///
     /// # Errors
     ///
@@ -178,7 +178,7 @@ impl<M: Module> Run<M> {
         self.step_on(task, &batches)
     }
 
-    /// The same, with the parts of the batch that were made before.
+    /// Makes one step on a batch whose parts are already made.
     pub(super) fn step_on<T: Task<M>>(
         &mut self,
         task: &T,

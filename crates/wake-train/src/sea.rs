@@ -1,4 +1,4 @@
-//! A sea is learnt from patches of images that nobody labelled.
+//! Training of a sea texture on patches of unlabelled images.
 
 use std::ops::Range;
 
@@ -12,14 +12,14 @@ use crate::streams::SEA_PLACES;
 use wake_ldm::sea_texture::{SeaFlow, SeaImage, SeaStyle, WINDOW};
 use wake_nn::noise::NoiseSource;
 
-/// Patches of an image for every one that fits into it beside the others, at most: more would show the same pixels.
+/// Largest number of patches for each one that fits into an image without overlap; more would repeat pixels.
 const OVERLAP: usize = 16;
-/// Places that are looked at for every patch that is wanted, at most.
+/// Largest number of places tried for each requested patch.
 const TRIES: u64 = 8;
-/// Places that an image can have looked at.
+/// Random places reserved for each image.
 const MOST: u64 = 1 << 32;
 
-/// Patches of open sea, which stay in memory: 72 KiB each.
+/// Patches of open sea in memory, 72 KiB each.
 #[derive(Debug, Clone, Default)]
 pub struct SeaPatches {
     patches: Vec<Patch>,
@@ -34,10 +34,11 @@ struct Patch {
 }
 
 impl SeaPatches {
-    /// Takes patches of open sea anywhere in an image, and returns how many were found: fewer than `count` where targets
-    /// and masks leave little sea, or the image is small.
+    /// Adds patches of open sea from random places in an image, and returns their number.
     ///
-    /// - `seed`: draws the places, others in every image
+    /// Fewer than `count` are found where targets and masks leave little sea, or the image is small.
+    ///
+    /// - `seed`: of the places, which differ from image to image
     pub fn push(&mut self, image: &SeaImage, count: usize, seed: u64) -> usize {
         let [rows, columns] = image.size();
         let number = self.images;
@@ -73,7 +74,7 @@ impl SeaPatches {
         self.patches.len()
     }
 
-    /// Whether there is none.
+    /// Whether there are no patches.
     pub fn is_empty(&self) -> bool {
         self.patches.is_empty()
     }
@@ -98,7 +99,7 @@ impl Patch {
     }
 }
 
-/// Learning the velocity of a sea's flow by its squared error.
+/// Task of the sea's flow: squared error of its velocity.
 ///
 /// ```text
 /// φ = πσ/2,    x = cos φ r + sin φ n,    loss = |v(x, σ, style) − (cos φ n − sin φ r)|²
@@ -149,7 +150,7 @@ impl Task<SeaFlow> for SeaTask<'_> {
         let (x, target, levels) = interpolate(image(residual), image(noise), &levels);
         let error = model.velocity(x, levels, features) - target.clone();
         let loss = error.square().mean();
-        // What a flow that stands still would lose.
+        // Loss of a flow with zero velocity.
         let still = number(&target.square().mean());
         let terms = vec![("sea", number(&loss)), ("still", still)];
         (loss, terms)
@@ -166,7 +167,7 @@ mod tests {
     use crate::{Checkpoint, LrSchedule, Run, RunOptions, TrainerOptions};
     use wake_ldm::sea_texture::SeaTexture;
 
-    /// Amplitudes exp(0.3 g) of Gaussian noise that neighbours in a row share half of.
+    /// Amplitudes exp(0.3 g) of Gaussian noise g with a correlation of ½ between neighbours in a row.
     fn skewed(rows: usize, columns: usize, seed: u64) -> Field {
         let white = NoiseSource::new(seed).normal(0, rows * columns + 1);
         let value = |n: usize| (0.3 * (white[n] + white[n + 1]) / f32::sqrt(2.0)).exp();
@@ -207,7 +208,7 @@ mod tests {
         Run::of("sea", &SeaFlow::shape(), SeaFlow::new, options, devices).unwrap()
     }
 
-    /// A stripe of one bright value, ten columns wide and less than three medians bright, is open sea to every other rule.
+    /// A stripe of one bright value, ten columns wide and below three medians, passes every other test for open sea.
     #[test]
     fn nothing_that_a_mask_marks_is_in_any_patch() {
         let mut image = skewed(400, 500, 2);
@@ -223,7 +224,7 @@ mod tests {
             let found = patches.push(&SeaImage::new(image.clone(), mask).unwrap(), 60, 3);
             assert_eq!(found, patches.len());
             let striped = patches.patches.iter().filter(|patch| {
-                // The stripe is the only value that comes twice side by side.
+                // Only in the stripe do neighbours have equal values.
                 patch
                     .values
                     .windows(2)
@@ -298,7 +299,7 @@ mod tests {
         moment(3) / moment(2).powf(1.5)
     }
 
-    /// Squares of 8 pixels, four of five at 100, the others at 40, and noise of 5 on all.
+    /// Squares of 8 pixels, four in five at 100 and the others at 40, with noise of standard deviation 5.
     fn squares(side: usize) -> Field {
         let random = NoiseSource::new(1);
         let white = random.normal(0, side * side);
@@ -317,9 +318,9 @@ mod tests {
         }
     }
 
-    /// Two levels, one of them with a probability of p = 0.2, have skewness −(1 − 2p)/√(p(1 − p)), −1.5, and the noise, of a
-    /// twenty-fourth of their variance, leaves (24/25)^{3/2} of it: −1.41. Gaussian noise has 0 up to √(6/N), 0.1 of the 512
-    /// squares in two images. What is learnt in few steps goes a third of the way, over four times that chance.
+    /// Two levels, the lower with probability p = 0.2, have the skewness −(1 − 2p)/√(p(1 − p)) = −1.5; noise of 1/24 of their
+    /// variance leaves (24/25)^{3/2} of it, −1.41. Gaussian noise has 0 ± √(6/N), 0.1 for the 512 squares of two images. A short
+    /// training reaches at least a third of −1.41, over four times that error.
     #[test]
     fn a_learnt_sea_is_skewed_as_its_images_are() {
         let mut patches = SeaPatches::default();
@@ -332,7 +333,7 @@ mod tests {
         let terms: Vec<Terms> = (0..STEPS).map(|_| run.step(&task).unwrap().1).collect();
         let late = &terms[STEPS - 10..];
         let mean = |term: usize| late.iter().map(|t| t[term].1).sum::<f64>() / 10.0;
-        // The mean of 40 patches of 256 squares each is known to a hundredth.
+        // The mean of 40 patches of 256 squares each has an error of 1 %.
         assert!(mean(0) < 0.9 * mean(1), "{} {}", mean(0), mean(1));
         let styles = patches.styles();
         let texture = SeaTexture::new(run.averaged(), &styles, None).unwrap();

@@ -1,4 +1,4 @@
-//! The sea of real images, learnt in the folder of one run.
+//! Training of the sea texture of real images, in a run folder.
 
 use std::path::Path;
 
@@ -15,16 +15,16 @@ use wake_ldm::sea_texture::{SeaFlow, SeaTexture};
 
 /// Name of the stage, its checkpoints and its log.
 const STAGE: &str = "sea";
-/// What it takes where nothing else is asked for.
+/// Defaults of the stage.
 const DEFAULTS: StageDefaults = StageDefaults {
     steps: 1200,
     batch: 16,
     rate: 1e-3,
 };
-/// Steps over which the rate rises to its largest, and decay of the averaged weights: less than a longer run takes.
+/// Warm-up steps and EMA decay, smaller than in longer runs.
 const WARMUP: usize = 50;
 const EMA_DECAY: f64 = 0.995;
-/// What is written: the sea, and the picture of it that the caller draws.
+/// Files that are written: the sea, and a picture of it drawn by the caller.
 const WEIGHTS: &str = "sea.safetensors";
 const SHEET: &str = "sea.png";
 
@@ -33,16 +33,16 @@ const SHEET: &str = "sea.png";
 pub struct SeaTraining<'a> {
     /// Training patches, at least one.
     pub patches: &'a SeaPatches,
-    /// Side of their pixels \[m\], where it is known: then scenes of other pixels are refused.
+    /// Pixel spacing of the patches \[m\], if known; scenes with another spacing are then refused.
     pub spacing: Option<f64>,
-    /// Identity of the images: a checkpoint of another run is refused.
+    /// Identity of the images; a checkpoint with another is refused.
     pub identity: Value,
     /// Options of the run.
     pub options: StageOptions,
 }
 
 impl SeaTraining<'_> {
-    /// Checks constants before any image is read.
+    /// Checks the options before any image is read.
     ///
     /// # Errors
     ///
@@ -51,14 +51,16 @@ impl SeaTraining<'_> {
         constants(options, Value::Null).validate(options.devices.len())
     }
 
-    /// Makes all steps. Writes `sea.safetensors`, which [`SeaTexture::load`] reads, a log, `config.json`, `run.json` and `checkpoints/`; a run
-    /// that was killed goes on from its last checkpoint.
+    /// Runs the training; a killed run can be resumed from its last checkpoint.
     ///
-    /// - `draw`: draws the sea as it is now into a file, `sea.png`, after every checkpoint
+    /// Writes `sea.safetensors`, which [`SeaTexture::load`] reads, a log, `config.json`, `run.json` and `checkpoints/`.
+    ///
+    /// - `draw`: draws the current sea into a file, `sea.png`, after every checkpoint
     ///
     /// # Errors
     ///
-    /// Those of `draw`, and as [`check`](Self::check), [`SeaTexture::new`]; [`wake_nn::Error::InvalidOption`] for a folder of another run.
+    /// Errors of `draw`, and as [`check`](Self::check), [`SeaTexture::new`]; [`wake_nn::Error::InvalidOption`] for a folder of
+    /// another run.
     pub fn train<E: From<Error>>(
         &self,
         out: &Path,
@@ -67,7 +69,7 @@ impl SeaTraining<'_> {
     ) -> Result<(), E> {
         let (options, shape) = (&self.options, SeaFlow::shape());
         let styles = self.patches.styles();
-        // What cannot become a sea is refused before the first step.
+        // Patches that cannot make a sea are refused before the first step.
         SeaTexture::new(SeaFlow::new(&options.device()), &styles, self.spacing)
             .map_err(Error::from)?;
         let begin = (STAGE, options.resume);

@@ -10,21 +10,21 @@ use wake_nn::self_check::{self, Stage, seeded};
 use super::tensors::gradients;
 use wake_ldm::unet::{UNetConfig, UNetInput};
 
-/// What flex computes.
+/// Gradients computed by flex.
 const REFERENCE: &[u8] = include_bytes!("../assets/self_check.safetensors");
 
-/// Computes loss and gradients of a small U-Net on a device, and compares with numbers of the CPU backend flex.
+/// Computes the gradients of a small U-Net on a device and compares them with those of the CPU backend flex.
 ///
-/// Runs do so by themselves on devices that are no CPU, once for each device.
+/// Runs do this automatically, once for each device other than a CPU.
 ///
 /// # Errors
 ///
-/// [`wake_nn::Error::WrongNumbers`] with the largest difference, and the allowed one.
+/// [`wake_nn::Error::WrongNumbers`] with the largest difference and the allowed one.
 pub fn self_check(device: &Device) -> Result<()> {
     self_check::compare(device, REFERENCE, [training_step(device)])
 }
 
-/// Checks a device that is no CPU when a run begins on it, once a process.
+/// Checks a device other than a CPU when a run begins on it, once per process.
 pub(crate) fn check_once(device: &Device) -> Result<()> {
     static CHECKED: Mutex<Vec<Device>> = Mutex::new(Vec::new());
     self_check::check_once(&CHECKED, device, self_check)
@@ -58,7 +58,7 @@ fn training_step(device: &Device) -> Stage {
 mod tests {
     use super::*;
 
-    /// With `DRAW=1` this writes the file anew.
+    /// Writes the file anew if `DRAW=1` is set.
     #[test]
     fn the_file_has_what_flex_computes() {
         let device = Device::flex();

@@ -1,4 +1,4 @@
-//! Images of a model beside those that it learns from.
+//! Sample sheets: images of a model below those it is trained on.
 
 use std::path::Path;
 
@@ -7,11 +7,11 @@ use wake_physics::output;
 use crate::error::Result;
 use wake_dataset::Pair;
 
-/// Writes a PNG file with images of a set above, and below each one what the model makes of its scene or prompt.
+/// Writes a PNG file with training images above and, below each, the model's image of the same scene or prompt.
 ///
-/// - `drawn`: grey 0…1 in rows, as many numbers an image as a pair has
+/// - `drawn`: the model's image for each pair, grey 0…1 row by row
 ///
-/// All are squares of one size.
+/// All images are squares of one size.
 pub(super) fn write_sheet(examples: &[Pair], drawn: &[Vec<f32>], path: &Path) -> Result<()> {
     let size = examples.first().map_or(0, |pair| pair.image.rows);
     let width = size * examples.len();

@@ -1,5 +1,5 @@
-//! A small model of Stable Diffusion's kind from nothing, in the folder of one run: the autoencoder, then text encoder and
-//! U-Net together.
+//! Training of a small latent diffusion model from scratch, in a run folder: the autoencoder, then text encoder and U-Net
+//! together.
 
 use std::path::Path;
 
@@ -26,7 +26,7 @@ use wake_ldm::unet::UNetConfig;
 use wake_nn::weights::{Layout, Precision, save_folder};
 use whole_files::fingerprint;
 
-/// Names of the two stages, and what they take where nothing else is asked for.
+/// Names and defaults of the two stages.
 const AUTOENCODER: &str = "autoencoder-kl";
 const MODEL: &str = "text-to-image";
 const DEFAULTS: StageDefaults = StageDefaults {
@@ -38,27 +38,27 @@ const AUTOENCODER_DEFAULTS: StageDefaults = StageDefaults {
     steps: 2000,
     ..DEFAULTS
 };
-/// What the stages write.
+/// Files written by the stages.
 const VAE: &str = "vae/diffusion_pytorch_model.safetensors";
 const SHEET: &str = "sheet.png";
 /// Images read or simulated at the same time.
 const AT_ONCE: u64 = 64;
-/// Images of a sheet, and the steps that they are drawn with.
+/// Images of a sheet, and their sampling steps.
 const SHOWN: u64 = 8;
 const DRAWN: usize = 25;
-/// Channels of a token.
+/// Channels of a token embedding.
 const TOKENS: usize = 128;
 
-/// Training of a small model of Stable Diffusion's kind on images and prompts alone.
+/// Training of a small latent diffusion model on images and prompts alone.
 #[derive(Debug, Clone)]
 pub struct PipelineTraining<'a> {
     /// Training pairs.
     pub pairs: &'a TrainingPairs,
-    /// Steps of the autoencoder; `None`: the usual number.
+    /// Steps of the autoencoder; `None`: the default.
     pub autoencoder_steps: Option<usize>,
     /// Shape of the latents.
     pub latents: LatentShape,
-    /// Steps of text encoder and U-Net after which it stops, to go on later; `None`: all.
+    /// Steps of text encoder and U-Net after which to stop, to be resumed later; `None`: all.
     pub stop_after: Option<usize>,
     /// Options of the stages; the steps are those of text encoder and U-Net.
     pub options: StageOptions,
@@ -69,7 +69,7 @@ pub struct PipelineTraining<'a> {
 pub struct LatentShape {
     /// Channels.
     pub channels: usize,
-    /// Levels of the autoencoder, 1 to 3: a latent pixel stands for 4, 8 or 16 pixels along each axis.
+    /// Levels of the autoencoder, 1 to 3: a latent pixel covers 4, 8 or 16 pixels along each axis.
     pub levels: usize,
 }
 
@@ -94,12 +94,12 @@ impl LatentShape {
 }
 
 impl PipelineTraining<'_> {
-    /// Checks constants and the size of the images, without which nothing can be learnt.
+    /// Checks the options, and that the models can take the size of the images.
     ///
     /// # Errors
     ///
-    /// As [`RunOptions::validate`](super::RunOptions::validate), and [`wake_nn::Error::InvalidOption`] for images that the models cannot
-    /// halve as often as they do.
+    /// As [`RunOptions::validate`](super::RunOptions::validate), and [`wake_nn::Error::InvalidOption`] for an empty set, or for
+    /// images that are not square or whose side is not a multiple of the models' downsampling.
     pub fn check(&self) -> Result<()> {
         let constants = self.options.run(&DEFAULTS, Value::Null);
         constants.validate(self.options.devices.len())?;
@@ -117,20 +117,21 @@ impl PipelineTraining<'_> {
         }))
     }
 
-    /// Memory that images and latents take \[bytes\].
+    /// Memory of images and latents \[bytes\].
     #[must_use]
     pub fn bytes(&self) -> u64 {
         let (pixels, down) = (
             self.pairs.source().size().iter().product::<usize>(),
             self.latents.autoencoder().downsampling(),
         );
-        // Two bytes a pixel, and four a latent number while they are scaled.
+        // Two bytes per pixel; per latent two bytes, and four more while the latents are scaled.
         let each = 2 * pixels + 6 * self.latents.channels * pixels / (down * down);
         self.pairs.len().saturating_mul(each as u64)
     }
 
-    /// Makes all steps. Writes what [`Pipeline::load`] reads, `sheet.png`, logs, `config.json`, `run.json` and `checkpoints/`; a run that was
-    /// killed goes on from its last checkpoints.
+    /// Runs both stages; a killed run can be resumed from its last checkpoints.
+    ///
+    /// Writes the files that [`Pipeline::load`] reads, `sheet.png`, logs, `config.json`, `run.json` and `checkpoints/`.
     ///
     /// # Errors
     ///
@@ -194,7 +195,7 @@ impl PipelineTraining<'_> {
         stage.train(&mut folder, run, &task, progress, show)
     }
 
-    /// The first stage.
+    /// Trains the autoencoder.
     fn autoencoder(
         &self,
         folder: &mut RunFolder,
@@ -231,7 +232,7 @@ impl PipelineTraining<'_> {
         stage.train(folder, run, &task, progress, show)
     }
 
-    /// How a stage runs: on from its last checkpoint, if that is asked for and there is one.
+    /// Stage that resumes from its last checkpoint if that is requested and there is one.
     fn stage<'a>(
         &self,
         name: &'static str,
@@ -249,7 +250,7 @@ impl PipelineTraining<'_> {
         }
     }
 
-    /// All images and prompts.
+    /// Reads all images and prompts.
     fn images(&self, done: &dyn Fn(u64)) -> Result<PromptedImages> {
         let (mut images, count) = (PromptedImages::default(), self.pairs.len());
         for first in (0..count).step_by(AT_ONCE as usize) {
@@ -281,7 +282,7 @@ fn schedule(scheduler: &SchedulerConfig) -> Result<&NoiseSchedule> {
     })
 }
 
-/// The model as it is now.
+/// Parts of the pipeline with the current weights.
 fn parts(
     learnt: TextToImage,
     autoencoder: &AutoencoderKl,
@@ -298,7 +299,7 @@ fn parts(
     }
 }
 
-/// What the model draws from the prompts of some pairs, grey 0…1 of the first channel and all others.
+/// Images that the model generates from the prompts of some pairs, grey 0…1 of all channels.
 fn draw(pipeline: &Pipeline, examples: &[Pair], seed: u64) -> Result<Vec<Vec<f32>>> {
     let prompts: Vec<String> = examples.iter().map(|pair| pair.prompt.clone()).collect();
     let request = Request::new(prompts)

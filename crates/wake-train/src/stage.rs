@@ -10,32 +10,32 @@ use super::run::{Run, Task, Terms};
 use super::trainer::StepReport;
 use crate::error::Error;
 
-/// How a [`Run`] is kept in a folder.
+/// How a [`Run`] is carried out and stored in a folder.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Stage<'a> {
     /// Name of the stage, its checkpoints and its log.
     pub name: &'static str,
-    /// Whether it goes on from the newest checkpoint.
+    /// Whether to resume from the newest checkpoint.
     pub resume: bool,
     /// Steps between checkpoints, at least 1.
     pub every: usize,
-    /// Checkpoints that are kept, at least 1.
+    /// Number of checkpoints to keep, at least 1.
     pub keep: usize,
-    /// Steps in all.
+    /// Total number of steps.
     pub steps: usize,
-    /// Files of the folder that are written after every checkpoint.
+    /// Result files, written after every checkpoint.
     pub results: &'a [&'a str],
 }
 
 impl Stage<'_> {
-    /// Makes all steps.
+    /// Runs the stage to its last step.
     ///
     /// - `progress`: called after every step
-    /// - `show`: writes the results, after every checkpoint; and at the start, where a kill has left those of an earlier one
+    /// - `show`: writes the results after every checkpoint, and at the start if a killed run left outdated ones
     ///
     /// # Errors
     ///
-    /// Those of `show`, of the run's steps, and of files that cannot be written.
+    /// Errors of `show`, of the run's steps, and of files that cannot be written.
     pub(crate) fn train<M: Module, T: Task<M>, E: From<Error>>(
         self,
         folder: &mut RunFolder,
@@ -81,9 +81,9 @@ impl Stage<'_> {
     }
 }
 
-/// One step, while another thread makes the batch of the next.
+/// Makes one step while another thread makes the next batch.
 ///
-/// - `ready`: the parts of the batch of this step, empty at first; of the next step afterwards, if the run of `steps` has one
+/// - `ready`: parts of the batch of this step, empty at first; on return of the next step, if the run of `steps` has one
 fn step_ahead<M: Module, T: Task<M>>(
     run: &mut Run<M>,
     task: &T,

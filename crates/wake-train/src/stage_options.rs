@@ -1,4 +1,4 @@
-//! How a stage of training runs: how long, how fast, from where, and on what.
+//! Options of a training stage.
 
 use burn::tensor::{DType, Device};
 use serde_json::Value;
@@ -8,15 +8,15 @@ use super::run::RunOptions;
 use super::trainer::TrainerOptions;
 use crate::error::{Error, Result};
 
-/// Steps over which the rate of a stage rises to its largest.
+/// Warm-up steps of the learning rate.
 const WARMUP: usize = 100;
 
-/// What a stage takes where nothing else is asked for.
+/// Defaults of a stage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct StageDefaults {
-    /// Steps in all.
+    /// Total number of steps.
     pub steps: usize,
-    /// Examples of a batch.
+    /// Examples in a batch.
     pub batch: usize,
     /// Peak learning rate.
     pub rate: f64,
@@ -25,23 +25,23 @@ pub(crate) struct StageDefaults {
 /// Options of a stage of training.
 #[derive(Debug, Clone)]
 pub struct StageOptions {
-    /// Steps in all; `None`: the usual number.
+    /// Total number of steps; `None`: the default of the stage.
     pub steps: Option<usize>,
-    /// Examples of a batch; `None`: the usual number.
+    /// Examples in a batch; `None`: the default of the stage.
     pub batch: Option<usize>,
     /// Peak learning rate; `None`: the default of the stage.
     pub rate: Option<f64>,
-    /// Parts of a batch that a device takes one after the other, to save memory.
+    /// Parts of its batch that a device processes one after the other, to save memory.
     pub grad_accumulation_steps: usize,
     /// Steps between checkpoints, at least 1.
     pub every: usize,
-    /// Checkpoints that are kept, at least 1.
+    /// Number of checkpoints to keep, at least 1.
     pub keep: usize,
-    /// Seed of everything that is drawn.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// Whether it goes on from the newest checkpoint.
+    /// Whether to resume from the newest checkpoint.
     pub resume: bool,
-    /// Whether less is kept for the way back through the model, and computed again.
+    /// Whether to use gradient checkpointing: fewer activations are kept, and the others are computed again.
     pub checkpointing: bool,
     /// Whether losses and gradients are computed in bfloat16; weights keep 32 bits.
     pub bf16: bool,
@@ -68,14 +68,14 @@ impl Default for StageOptions {
 }
 
 impl StageOptions {
-    /// Steps in all.
+    /// Total number of steps.
     pub(crate) fn steps(&self, usual: &StageDefaults) -> usize {
         self.steps.unwrap_or(usual.steps)
     }
 
     /// Constants of the stage's run.
     ///
-    /// - `identity`: what it learns from, see [`RunOptions::identity`]
+    /// - `identity`: identity of the training data, see [`RunOptions::identity`]
     pub(crate) fn run(&self, usual: &StageDefaults, identity: Value) -> RunOptions {
         RunOptions {
             batch: self.batch.unwrap_or(usual.batch),
@@ -94,17 +94,17 @@ impl StageOptions {
         }
     }
 
-    /// The device of what is computed without gradients.
+    /// Device for computations without gradients.
     #[must_use]
     pub fn device(&self) -> Device {
         self.devices.first().cloned().unwrap_or_default()
     }
 
-    /// The devices in autodiff, for what learns.
+    /// Autodiff devices for training.
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::UnsupportedPrecision`] for a device that does not compute in the bfloat16 that is asked for.
+    /// [`wake_nn::Error::UnsupportedPrecision`] for a device without bfloat16 if that is requested.
     pub fn learning_devices(&self) -> Result<Vec<Device>> {
         let learning = |device: &Device| {
             if self.bf16 && !device.supports_dtype(DType::BF16) {
@@ -122,10 +122,10 @@ impl StageOptions {
         self.devices.iter().map(learning).collect()
     }
 
-    /// The same for a stage that runs because a later one needs it, and that may have been stopped half-way.
+    /// Options of an earlier stage that a later one needs, and that may have been stopped half-way.
     ///
-    /// - `left`: the steps that it was begun for, 0 if it never was
-    /// - `state`: of its last checkpoint, `Null` if there is none
+    /// - `left`: steps that the stage was begun for, 0 if it never began
+    /// - `state`: state of its last checkpoint, `Null` if there is none
     pub(super) fn before(&self, left: usize, state: &Value) -> Self {
         Self {
             steps: Some(left).filter(|&steps| steps > 0),
@@ -151,7 +151,7 @@ mod tests {
         rate: 1e-3,
     };
 
-    /// What is asked for is taken, and what is left open is usual.
+    /// Given options are used; the others take the defaults.
     #[test]
     fn what_is_left_open_is_usual() {
         let options = StageOptions {
@@ -164,7 +164,7 @@ mod tests {
         assert_eq!((rate.steps, run.batch), (40, 8));
     }
 
-    /// A stage that was stopped goes on as it was begun; one that never began takes what is usual for it.
+    /// A stopped stage continues with the options it was begun with; one that never began takes its defaults.
     #[test]
     fn an_earlier_stage_goes_on_as_it_was_begun() {
         let later = StageOptions {

@@ -1,4 +1,4 @@
-//! Streams of numbers that training and evaluation draw from a seed; see [`wake_nn::noise`].
+//! Streams of random numbers of training and evaluation; see [`wake_nn::noise`].
 
 /// Normal numbers: the noise of fine-tuning.
 pub(crate) const FINE_TUNE_STREAM: u32 = 3;
@@ -11,17 +11,17 @@ pub(crate) const LEVELS: u32 = 2000;
 pub(crate) const CELLS: u32 = 2001;
 /// Places of patches in a two-sample test.
 pub(crate) const PLACES: u32 = 2002;
-/// Places of patches that a sea is learnt from.
+/// Places of the training patches of a sea.
 pub(crate) const SEA_PLACES: u32 = 2003;
-/// Places of the squares that an autoencoder learns from.
+/// Places of the training crops of an autoencoder.
 pub(crate) const CROPS: u32 = 2004;
-/// Training steps of fine-tuning.
+/// Diffusion steps of training examples.
 pub(crate) const STEPS: u32 = 2100;
-/// Prompts that are left out.
+/// Prompts left out in text-to-image training.
 pub(crate) const LEFT_OUT: u32 = 2101;
 /// Pairs of fine-tuning.
 pub(crate) const PAIRS: u32 = 2200;
-/// Prompts that fine-tuning leaves out.
+/// Prompts left out in fine-tuning.
 pub(crate) const UNTOLD: u32 = 2201;
 
 #[cfg(test)]
@@ -30,7 +30,7 @@ mod tests {
     use wake_dataset::streams::{ORDER, SEEDS, VALUES, WORDINGS};
     use wake_ldm::streams::*;
 
-    /// Each purpose has numbers of its own; the last one may count up without end.
+    /// Each purpose has its own streams; the last range is open-ended.
     #[test]
     fn streams_do_not_overlap() {
         let one = |stream| (stream, 1);

@@ -1,4 +1,4 @@
-//! What the parts of the small model learn.
+//! Training tasks of the parts of the wake model.
 
 use std::f32::consts::FRAC_PI_2;
 use std::ops::Range;
@@ -35,7 +35,7 @@ pub(super) fn noise_level(random: NoiseSource, position: u64) -> f64 {
     1.0 / (1.0 + (-normal).exp())
 }
 
-/// The examples at some positions of a run: each round through a set is in another order.
+/// Examples at some positions of a run; each epoch has another order.
 pub(super) fn examples(
     seed: u64,
     positions: impl Iterator<Item = u64>,
@@ -51,12 +51,12 @@ pub(super) fn noise_of(seed: u64, position: u64) -> NoiseSource {
     NoiseSource::new(seed ^ position.wrapping_mul(0x9E37_79B9_7F4A_7C15))
 }
 
-/// Reading what prompts state: squared error of each quantity, and of whether it is stated.
+/// Task of the prompt parser: squared errors of each quantity, and of whether it is stated.
 #[derive(Debug)]
 pub(crate) struct ParserTask<'a> {
     /// The prompts.
     pub prompts: &'a Prompts,
-    /// The ids that the reader knows.
+    /// Token ids of the parser.
     pub vocabulary: &'a Vocabulary,
 }
 
@@ -92,18 +92,18 @@ impl Task<PromptParser> for ParserTask<'_> {
     }
 }
 
-/// Latent pixels of an image that a step looks at.
+/// Latent pixels of an image in a step.
 const CELLS: usize = 64;
 
-/// Learning mean and spread by the likelihood of the latents, and the mean grey by its squared error.
+/// Task of the prior: likelihood of the latents for mean and spread, squared error of the mean grey.
 ///
 /// ```text
 /// loss = mean[½ (z − μ)²/⌊s⌋] + mean[½ ((z − ⌊μ⌋)/s)² + ln s] + ½ (10 (grey − found))²
 /// ```
 ///
-/// ⌊ ⌋ counts as a constant. With the likelihood alone, ½ ((z − μ)/s)² in the first mean, a wake not yet learnt would be
-/// taken for a rough sea, and hardly be learnt any more. Many scenes, few pixels of each: the network sees one latent
-/// pixel at a time.
+/// ⌊ ⌋ stops the gradient. With the plain likelihood, ½ ((z − μ)/s)² in the first mean, a wake not yet learnt would be taken
+/// for a rough sea, and would hardly be learnt any more. A batch has many scenes and few pixels of each: the network sees one
+/// latent pixel at a time.
 ///
 /// # References
 ///
@@ -114,12 +114,12 @@ const CELLS: usize = 64;
 pub(crate) struct PriorTask<'a> {
     /// The latents.
     pub set: &'a LatentSet,
-    /// Seed of the order.
+    /// Seed of the order and of the pixels.
     pub seed: u64,
 }
 
 impl PriorTask<'_> {
-    /// Latent pixels to learn from: half of them anywhere, half inside the wedge, if there is one.
+    /// Draws latent pixels to train on: half of them anywhere, half inside the Kelvin wedge if there is one.
     fn cells(&self, scene: &Scene, position: u64) -> Vec<usize> {
         let random = NoiseSource::new(self.seed);
         let all = MapGrid::of(&scene.grid).cells();
@@ -189,7 +189,8 @@ impl Task<Prior> for PriorTask<'_> {
     }
 }
 
-/// Between data r and noise n at noise levels σ: x = cos φ r + sin φ n, its velocity cos φ n − sin φ r, and σ, φ = πσ/2.
+/// Mixes data r and noise n at noise levels σ into x = cos φ r + sin φ n; returns x, its velocity cos φ n − sin φ r, and σ;
+/// φ = πσ/2.
 pub(super) fn interpolate(
     data: Tensor<4>,
     noise: Tensor<4>,
@@ -203,13 +204,13 @@ pub(super) fn interpolate(
     (x, noise * cos - data * sin, levels)
 }
 
-/// Learning the velocity of the flow by its squared error.
+/// Task of the flow: squared error of its velocity.
 ///
 /// ```text
 /// φ = πσ/2,    x = cos φ r + sin φ n,    loss = |v(x, σ, numbers) − (cos φ n − sin φ r)|²
 /// ```
 ///
-/// with n Gaussian noise like the scene's sea. A batch whose noise cannot be made has a loss that is not a number, and is passed over.
+/// with n Gaussian noise like the scene's sea; noise that cannot be made is an error of the batch.
 ///
 /// # References
 ///
@@ -217,7 +218,7 @@ pub(super) fn interpolate(
 /// Distillation for Fast Sampling of Diffusion Models" (v).
 #[derive(Debug)]
 pub(crate) struct FlowTask<'a> {
-    /// The residuals.
+    /// The residuals of the latents.
     pub set: &'a LatentSet,
     /// Transform that encoded them, outside autodiff.
     pub patches: &'a PatchTransform,
@@ -225,10 +226,10 @@ pub(crate) struct FlowTask<'a> {
     pub seed: u64,
 }
 
-/// What a step of the flow needs, but the latents themselves.
+/// Data of a step of the flow, except the latents.
 #[derive(Debug)]
 pub(crate) struct FlowBatch {
-    /// Which examples.
+    /// Indices of the examples.
     indices: Vec<usize>,
     /// Their noise levels.
     levels: Vec<f32>,

@@ -29,11 +29,11 @@ pub(super) fn gradients<M: Module>(module: &M, gradients: Gradients) -> Vec<Tens
     lister.found
 }
 
-/// The module with other values.
+/// Replaces the parameters of a module.
 ///
 /// # Panics
 ///
-/// When the list is not one that [`values`] could give for this module.
+/// When the list does not match the parameters of the module.
 pub(super) fn replaced<M: Module>(module: M, values: Vec<Tensor<1>>) -> M {
     let mut replacer = Replacer {
         values: values.into_iter(),
@@ -46,12 +46,11 @@ pub(super) fn replaced<M: Module>(module: M, values: Vec<Tensor<1>>) -> M {
     module
 }
 
-/// The module with parameters of type `bfloat16`, which learn where the old ones did.
+/// Casts the parameters of a module to `bfloat16`; they require gradients where the old ones did.
 pub(super) fn rounded<M: Module>(module: M) -> M {
     module.map(&mut Rounder)
 }
 
-/// A flat tensor of the same numbers.
 fn flat<const D: usize>(tensor: Tensor<D>) -> Tensor<1> {
     tensor.reshape([-1])
 }
@@ -128,7 +127,7 @@ fn plain<const D: usize>(tensor: &Tensor<D>) -> Tensor<D> {
     tensor.clone()
 }
 
-/// A new value in the place of an old one: in autodiff, and learning, if the old one is.
+/// Gives a new value the autodiff state of the old one.
 fn relearnt<const D: usize>(old: &Tensor<D>, new: Tensor<D>) -> Tensor<D> {
     if !old.is_autodiff() {
         return new;

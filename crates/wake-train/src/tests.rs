@@ -35,7 +35,7 @@ fn config() -> WakeModelConfig {
     }
 }
 
-/// Waves whose direction the conditions tell, and the patches that encode them.
+/// Latents of waves whose direction is the ship's heading, and the transform that encodes them.
 fn set() -> (LatentSet, PatchTransform) {
     let device = Device::flex();
     let wave = |i: usize| -> Vec<f32> {
@@ -52,7 +52,7 @@ fn set() -> (LatentSet, PatchTransform) {
         let mut scene = config().base_scene();
         let ship = &mut scene.ships[0];
         (ship.speed, ship.heading) = (8.0, (i as f64).to_degrees());
-        // What is expected shows half of the wave.
+        // The expected image has half of the wave's amplitude.
         let physics = PhysicsPrior {
             grey: image.iter().map(|g| 0.5 + 0.5 * (g - 0.5)).collect(),
             log_deviations: vec![0.0; 4],
@@ -93,14 +93,14 @@ fn run(workers: usize, accumulation: usize) -> Run<Flow> {
     .unwrap()
 }
 
-/// A run that goes on from a checkpoint.
+/// Resumes a run from a checkpoint.
 fn resumed(workers: usize, accumulation: usize, checkpoint: &Checkpoint) -> Run<Flow> {
     let mut run = run(workers, accumulation);
     run.resume(checkpoint.clone()).unwrap();
     run
 }
 
-/// The weights after a checkpoint, as numbers.
+/// Tensors of a run's checkpoint.
 fn weights(run: &Run<Flow>, folder: &Path) -> Tensors {
     run.checkpoint(folder, 2).unwrap();
     Checkpoint::newest(folder).unwrap().unwrap().tensors
@@ -121,7 +121,7 @@ fn advance(
         .collect()
 }
 
-/// The same start for several runs: random initialisation draws from a generator that other tests share.
+/// Common start of several runs: random initialisation draws from a generator that other tests share.
 fn start(folder: &Path) -> Checkpoint {
     run(1, 1).checkpoint(folder, 2).unwrap();
     Checkpoint::newest(folder).unwrap().unwrap()
@@ -161,7 +161,7 @@ fn two_workers_and_two_parts_make_the_step_of_one() {
     for (workers, accumulation) in [(2, 1), (1, 2), (2, 2)] {
         let (other_losses, other) = after(workers, accumulation);
         for (a, b) in losses.iter().zip(&other_losses) {
-            // Means of f32 over another order of some thousand terms.
+            // Means of some thousand f32 terms in another order.
             assert!((a - b).abs() < 1e-5 * a.abs(), "{a} {b}");
         }
         for (name, (_, numbers)) in one.iter().filter(|(name, _)| name.starts_with("first.")) {
@@ -191,7 +191,7 @@ fn early_and_late(losses: &[f64]) -> [f64; 2] {
 fn the_loss_of_the_flow_falls() {
     let losses = advance(&mut run(1, 1), &set(), 150);
     let [early, late] = early_and_late(&losses);
-    // The first losses are the variance of the velocity; the mean of five, 1,280 squares, is known to 0.04 of it.
+    // The first losses are the variance of the velocity; the mean of five, over 1,280 squares, has a relative error of 0.04.
     assert!(late < 0.8 * early, "{early} {late}");
 }
 
@@ -205,7 +205,7 @@ fn sixteen_bits_learn_as_32_bits_do() {
         let mut options = options(1);
         options.trainer.bf16 = bf16;
         let mut run = Run::of("flow", &json!(config()), init, options, devices).unwrap();
-        // The same weights; a run of its own would begin with 32 bits or go on with them.
+        // The same weights for both; a run cannot be resumed with another precision otherwise.
         let mut start = start.clone();
         start.state["trainer"]["bf16"] = bf16.into();
         run.resume(start).unwrap();
@@ -214,10 +214,10 @@ fn sixteen_bits_learn_as_32_bits_do() {
         losses
     };
     let (wide, narrow) = (losses(false), losses(true));
-    // Eight bits of mantissa, a dozen layers: 2⁻⁸ √12 of the velocity, once forward.
+    // Eight bits of mantissa and a dozen layers: an error of 2⁻⁸ √12 of the velocity in one forward pass.
     assert!((wide[0] - narrow[0]).abs() < 0.014 * wide[0]);
     let [[early, late], [_, other]] = [&wide, &narrow].map(|losses| early_and_late(losses));
-    // Rounding sends the two apart; what is left to learn falls alike.
+    // Rounding makes the two diverge, but their losses fall alike.
     assert!(
         late < 0.9 * early && (other - late).abs() < 0.25 * (early - late),
         "{early} {late} {other}"
@@ -242,7 +242,7 @@ fn a_prior_learns_a_mean_that_leaves_residuals_of_variance_one() {
     let steps: Vec<(StepReport, Terms)> = (0..300).map(|_| run.step(&task).unwrap()).collect();
     let losses: Vec<f64> = steps.iter().map(|(report, _)| report.loss).collect();
     let [_, late] = early_and_late(&losses);
-    // Latents have variance 1: both terms of the loss are ½ where nothing is known but that.
+    // Latents have variance 1: both terms of the loss are ½ for a prior that has learnt nothing else.
     assert!(late < 0.9, "{late}");
     let count = set.len();
     let done = AtomicUsize::new(0);
@@ -253,8 +253,8 @@ fn a_prior_learns_a_mean_that_leaves_residuals_of_variance_one() {
     let all: Vec<usize> = (0..count).collect();
     let squares = residuals.latents(&all, &Device::flex()).square().mean();
     let variance = squares.into_scalar::<f32>();
-    // A fitted deviation σ has a loss of ½ + ln σ: undivided residuals would have the variance σ², and divided latents, less no mean,
-    // one of 1/σ². Averaged weights lag behind the last ones.
+    // A fitted deviation σ has a loss of ½ + ln σ: residuals not divided by it would have the variance σ², and latents divided
+    // by it without the mean subtracted 1/σ². Averaged weights lag behind the last ones.
     let undivided = (2.0 * (late - 0.5)).exp();
     assert!(undivided < 0.01, "{undivided}");
     assert!((0.3..3.0).contains(&variance), "{variance}");
@@ -271,8 +271,8 @@ fn a_reader_learns_to_tell_prompts_apart() {
     };
     let init = |device: &Device| config.init_parser(device);
     let devices = vec![Device::flex().autodiff()];
-    // As long as the run: a schedule that is over after 40 steps leaves a reader that has hardly learnt, and a verdict that
-    // depends on how a machine rounds.
+    // As long as the run: a schedule of 40 steps leaves a parser that has hardly learnt, and a result that depends on a
+    // machine's rounding.
     let mut options = options(1);
     options.trainer.rate.steps = 300;
     let mut run = Run::of("parser", &json!(config), init, options, devices).unwrap();
@@ -283,8 +283,8 @@ fn a_reader_learns_to_tell_prompts_apart() {
     let losses: Vec<f64> = (0..300).map(|_| run.step(&task).unwrap().0.loss).collect();
     let [early, late] = early_and_late(&losses);
     assert!(late < 0.6 * early, "{early} {late}");
-    // Prompts that were never learnt, read as what they state, and as what the next one states: a parser blind to the
-    // words is as wrong in both.
+    // Unseen prompts, compared with what they state and with what the next one states: a parser that ignores the words is
+    // equally wrong in both.
     let device = Device::flex();
     let (texts, said): (Vec<_>, Vec<_>) = (1000..1064)
         .map(|i| prompts.prompt(i).unwrap())
@@ -302,7 +302,7 @@ fn a_reader_learns_to_tell_prompts_apart() {
             .map(|(a, b)| f64::from(a - b).powi(2));
         squares.sum::<f64>() / read.len() as f64
     };
-    // 64 prompts of 21 numbers: the ratio is 1 to about 3 % for a blind parser, and three times that is no chance.
+    // 64 prompts of 21 numbers: for a parser that ignores the words the ratio is 1 to about 3 %; 10 % is three times that.
     assert!(error(0) < 0.9 * error(1), "{} {}", error(0), error(1));
 }
 
@@ -382,8 +382,8 @@ fn first_weight(trainer: &Trainer<burn::nn::Linear>) -> f64 {
     weights.iter::<f64>().next().unwrap()
 }
 
-/// Under one and the same gradient a step of Adam is as long as its rate, whatever the step's number, if that counts the
-/// steps that were made: 1 − βᵗ cancels in both averages. A step that is lost moves nothing and is not counted.
+/// With a constant gradient each step of Adam is as long as its rate, if its number counts only the steps that were made:
+/// 1 − βᵗ cancels in both averages. A lost step moves nothing and is not counted.
 #[test]
 fn a_step_that_is_lost_counts_for_nobody() {
     let mut trainer = of_a_plane(10);
@@ -400,7 +400,7 @@ fn a_step_that_is_lost_counts_for_nobody() {
         }
     }
     assert_eq!(trainer.steps(), 5);
-    // Weights below 1 are 32-bit numbers: 6e-8 a step; ε of 1e-8 beside the gradient's ½.
+    // Rounding of 32-bit weights below 1: 6e-8 per step; ε is 1e-8 beside a clipped gradient of 0.7.
     let found = start - first_weight(&trainer);
     assert!((found - moved).abs() < 5e-7, "{found} {moved}");
 }

@@ -1,4 +1,4 @@
-//! A latent diffusion model is learnt from images and prompts alone: the autoencoder, then text encoder and U-Net.
+//! Training tasks of a latent diffusion model: the autoencoder, then text encoder and U-Net.
 
 use std::ops::Range;
 
@@ -21,18 +21,18 @@ use wake_ldm::text::ClipText;
 use wake_ldm::unet::{UNet, UNetInput};
 use wake_nn::noise::{NoiseSource, normal_batch};
 
-/// Rows and columns of the squares that the autoencoder learns from, unless images are smaller.
+/// Rows and columns of the autoencoder's training crops, unless images are smaller.
 const CROP: usize = 128;
-/// Weight of the squared Laplacian of the error beside the squared error of a pixel.
+/// Weight of the squared Laplacian of the error, relative to the squared error.
 const CURVATURE: f64 = 1.0;
-/// Weight of a latent's divergence beside it.
+/// Weight of the divergence of a latent, relative to the squared error.
 const DIVERGENCE: f64 = 1e-5;
 /// Images that are encoded at once.
 const ENCODED: usize = 16;
 /// Target of the U-Net.
 pub(crate) const PREDICTION: Prediction = Prediction::Velocity;
 
-/// Images of one size beside their prompts in memory, 16 bits a pixel.
+/// Images of one size with their prompts in memory, 16 bits per pixel.
 #[derive(Debug, Default)]
 pub(crate) struct PromptedImages {
     size: [usize; 2],
@@ -41,11 +41,11 @@ pub(crate) struct PromptedImages {
 }
 
 impl PromptedImages {
-    /// Adds the image and the prompt of a pair, in CLIP's tokens.
+    /// Adds the image of a pair, and its prompt as CLIP tokens.
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::InvalidOption`] for an image of another size than those before.
+    /// [`wake_nn::Error::InvalidOption`] for an image of another size than earlier ones.
     pub(crate) fn push(&mut self, pair: &Pair) -> Result<()> {
         let size = [pair.image.rows, pair.image.columns];
         if self.prompts.is_empty() {
@@ -69,7 +69,7 @@ impl PromptedImages {
         self.prompts.len()
     }
 
-    /// The windows of `size` rows and columns at some places `[row, column]` of some images, grey 0…1.
+    /// Windows of `size` rows and columns at places (image, `[row, column]`), grey 0…1.
     fn windows(
         &self,
         places: &[(usize, [usize; 2])],
@@ -89,11 +89,11 @@ impl PromptedImages {
         Tensor::from_data(data, device)
     }
 
-    /// The latents of all images: the means of their posteriors, shifted and scaled to mean 0 and variance 1 together.
+    /// Encodes all images to the means of their posteriors, shifted and scaled to an overall mean of 0 and variance of 1.
     ///
-    /// - `done`: called with the number of images that were encoded
+    /// - `done`: called with the number of images after each batch
     ///
-    /// Returns the autoencoder that knows shift and scale, too.
+    /// Returns the latents, and the autoencoder with this shift and scale.
     ///
     /// # Panics
     ///
@@ -129,7 +129,7 @@ impl PromptedImages {
     }
 }
 
-/// Latents of images beside their prompts, 16 bits a number.
+/// Latents of images with their prompts, 16 bits per number.
 #[derive(Debug)]
 pub(crate) struct PromptedLatents {
     shape: [usize; 3],
@@ -145,15 +145,15 @@ impl PromptedLatents {
     }
 }
 
-/// Learning to encode and decode: squared error of the pixels, its Laplacian, and a little of the divergence of the latents
-/// from a normal distribution.
+/// Task of the autoencoder: squared error of the pixels and of its Laplacian, and a small divergence term of the latents.
 ///
 /// ```text
 /// e = decode(μ + σ n) − image,    loss = mean e² + mean (∇²e)² + 10⁻⁵ mean KL
 /// ```
 ///
-/// on squares of 128 pixels anywhere in the images, scaled to −1…1; KL of one latent number. The Laplacian weighs an error of
-/// wave number k by k⁴: short waves of the sea have a hundredth of the power of long ones and would be learnt last.
+/// on crops of 128 × 128 pixels anywhere in the images, scaled to −1…1; KL is the divergence of one latent number from a
+/// standard normal distribution. The Laplacian weights an error of wavenumber k by k⁴: short sea waves have a hundredth of the
+/// power of long ones and would be learnt last.
 ///
 /// # References
 ///
@@ -161,7 +161,7 @@ impl PromptedLatents {
 /// Synthesis with Latent Diffusion Models", appendix G (the weight).
 #[derive(Debug)]
 pub(crate) struct AutoencoderTask<'a> {
-    /// The images, at least one, each with rows and columns that the autoencoder can halve as often as it does.
+    /// Images, at least one, with rows and columns that are multiples of the autoencoder's downsampling.
     pub images: &'a PromptedImages,
     /// Seed of order, places and noise.
     pub seed: u64,
@@ -236,24 +236,25 @@ fn laplacian(images: &Tensor<4>) -> Tensor<4> {
     at(0, 1) + at(2, 1) + at(1, 0) + at(1, 2) - at(1, 1) * 4.0
 }
 
-/// What turns prompts into latents, and learns together.
+/// Text encoder and U-Net, trained together.
 #[derive(Module, Debug)]
 pub(crate) struct TextToImage {
-    /// Reads the prompt.
+    /// Encodes the prompt.
     pub text_encoder: ClipText,
-    /// Predicts the noise.
+    /// Predicts the velocity.
     pub unet: UNet,
 }
 
-/// Learning to tell latents from noise by their prompts.
+/// Task of text encoder and U-Net: squared error of the velocity.
 ///
 /// ```text
 /// x = √ᾱₜ z + √(1 − ᾱₜ) n,    v = √ᾱₜ n − √(1 − ᾱₜ) z
 /// loss = mean |unet(x, t, text encoder(prompt)) − v|²
 /// ```
 ///
-/// A tenth of the prompts is left out. The model predicts the velocity v, and not the noise n as Stable Diffusion v1.4 does: an
-/// error of z counts 1/(1 − ᾱₜ) in v, but ᾱₜ/(1 − ᾱₜ) in n, which is 0.005 in the first steps of sampling, where the prompt decides.
+/// A tenth of the prompts are left out. The model predicts the velocity v; Stable Diffusion v1.4 predicts the noise n. A squared
+/// error of z counts 1/(1 − ᾱₜ) in v, but ᾱₜ/(1 − ᾱₜ) in n, which is 0.005 in the first steps of sampling, where the prompt
+/// decides.
 ///
 /// # References
 ///
@@ -264,9 +265,9 @@ pub(crate) struct TextToImage {
 pub(crate) struct TextToImageTask<'a> {
     /// The latents, at least one.
     pub set: &'a PromptedLatents,
-    /// Noise of each step.
+    /// Noise schedule.
     pub schedule: &'a NoiseSchedule,
-    /// Seed of order, noise, steps, and of which prompts are left out.
+    /// Seed of order, noise, diffusion steps and left-out prompts.
     pub seed: u64,
 }
 

@@ -1,4 +1,4 @@
-//! One step of training, on one device or several.
+//! Training steps, on one device or several.
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
@@ -12,24 +12,24 @@ use wake_nn::check_range;
 
 /// Groups of a checkpoint's tensors, in the order of [`Trainer::state`].
 const GROUPS: [&str; 4] = ["weights", "average", "first", "second"];
-/// So many steps in a row without a finite gradient end a run.
+/// Number of steps in a row without a finite loss and gradient that ends a run.
 const LOST: usize = 20;
 
 /// Constants of a training loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrainerOptions {
-    /// Size of the steps.
+    /// Learning-rate schedule.
     pub rate: LrSchedule,
     /// Constants of the optimizer.
     pub adam: AdamOptions,
-    /// The largest norm of all gradients together; longer ones are shortened to it.
+    /// Largest norm of the whole gradient; longer gradients are clipped to it.
     pub max_grad_norm: f64,
     /// Decay of the averaged weights.
     pub ema_decay: f64,
-    /// Parts of a batch that one device takes after the other.
+    /// Parts of its batch that a device processes one after the other.
     pub grad_accumulation_steps: usize,
-    /// Whether losses and gradients are computed with weights of type `bfloat16`, where the device has it; weights,
-    /// averages and steps are 32 bits all the same (Micikevicius et al. 2018, "Mixed Precision Training", section 3.1).
+    /// Whether losses and gradients are computed with weights of type `bfloat16`, on a device that has it; weights, averages
+    /// and updates keep 32 bits (Micikevicius et al. 2018, "Mixed Precision Training", section 3.1).
     pub bf16: bool,
 }
 
@@ -51,7 +51,7 @@ impl Default for TrainerOptions {
 }
 
 impl TrainerOptions {
-    /// Checks that steps of these sizes can be made.
+    /// Checks that all constants are in range.
     ///
     /// # Errors
     ///
@@ -78,8 +78,8 @@ impl TrainerOptions {
         )?)
     }
 
-    /// What two runs must have in common for one to go on from the other; more steps may be asked of the second, and
-    /// `grad_accumulation_steps` changes no result.
+    /// Values that two runs must share for one to resume the other. The number of steps may differ, and so may
+    /// `grad_accumulation_steps`, which changes no result.
     pub(super) fn state(&self) -> Value {
         let AdamOptions {
             beta_1,
@@ -102,7 +102,7 @@ pub struct StepReport {
     pub loss: f64,
     /// Norm of the gradient before clipping.
     pub norm: f64,
-    /// Size of the step.
+    /// Learning rate.
     pub rate: f64,
     /// Whether the gradient was finite; if not, nothing was changed.
     pub applied: bool,
@@ -121,14 +121,14 @@ pub(crate) struct Trainer<M> {
     devices: Vec<Device>,
     /// Steps made.
     step: usize,
-    /// Those that changed the weights: what optimizer and average count.
+    /// Steps that changed the weights, as counted by optimizer and average.
     applied: usize,
-    /// Steps since the last of them.
+    /// Steps since the last one that changed the weights.
     lost: usize,
 }
 
 impl<M: Module> Trainer<M> {
-    /// A trainer of a model on the first of some autodiff devices.
+    /// Trainer of a model on the first of some autodiff devices.
     ///
     /// # Panics
     ///
@@ -170,16 +170,16 @@ impl<M: Module> Trainer<M> {
         self.step
     }
 
-    /// Parts that a batch is cut into.
+    /// Number of parts of a batch.
     pub(crate) fn parts(&self) -> usize {
         self.devices.len() * self.options.grad_accumulation_steps
     }
 
-    /// Whether the run still learns.
+    /// Checks that the run still makes steps.
     ///
     /// # Errors
     ///
-    /// [`Error::Diverged`] where none of many steps in a row, or of all so far, could be made.
+    /// [`Error::Diverged`] when many steps in a row, or all so far, had no finite loss and gradient.
     pub(crate) fn check(&self) -> Result<()> {
         let never = self.step > 0 && self.applied == 0;
         if self.lost >= LOST || (never && self.step >= self.options.rate.steps) {
@@ -194,9 +194,9 @@ impl<M: Module> Trainer<M> {
         Ok(())
     }
 
-    /// One step against the mean of `loss` over all parts.
+    /// Makes one step on the mean of `loss` over all parts.
     ///
-    /// - `loss`: of the model on a device, and the number of a part, below [`parts`](Self::parts)
+    /// - `loss`: loss of the model on a device, for a part numbered below [`parts`](Self::parts)
     pub(crate) fn step(
         &mut self,
         loss: impl Fn(&M, &Device, usize) -> Tensor<1> + Sync,
@@ -258,7 +258,7 @@ fn sum(a: (Vec<Tensor<1>>, f64), b: (Vec<Tensor<1>>, f64)) -> (Vec<Tensor<1>>, f
     (gradients, a.1 + b.1)
 }
 
-/// One thread for each device; the results are summed on the first, in the order of the devices.
+/// Runs one thread per device, and sums the results on the first device in the order of the devices.
 fn in_threads<M: Send>(
     devices: &[Device],
     copy: impl Fn(&Device) -> M,
@@ -292,13 +292,13 @@ fn global_norm(gradients: &[Tensor<1>]) -> f64 {
 }
 
 impl<M: Module> Trainer<M> {
-    /// Weights, their average and the optimizer's averages after the last step.
+    /// Checkpoint of the weights, their average and the optimizer's averages.
     ///
-    /// - `state`: what a run must have in common with this one to go on from here
+    /// - `state`: values that a run must share to resume from here
     ///
     /// # Errors
     ///
-    /// [`Error::Diverged`] for weights that are no finite numbers.
+    /// [`Error::Diverged`] for weights that are not finite.
     pub(crate) fn checkpoint(&self, state: &Value) -> Result<Checkpoint> {
         let names = names(self.model());
         let mut tensors = Tensors::new();
@@ -322,7 +322,7 @@ impl<M: Module> Trainer<M> {
         })
     }
 
-    /// Goes on where a checkpoint left off.
+    /// Resumes from a checkpoint.
     ///
     /// # Errors
     ///

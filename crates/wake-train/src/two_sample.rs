@@ -1,4 +1,4 @@
-//! Two-sample test: how well a small network tells two kinds of images apart that it has not seen.
+//! Classifier two-sample test: how well a small network separates two kinds of images that it has not seen.
 
 use burn::module::Module;
 use burn::nn::conv::Conv2d;
@@ -21,7 +21,7 @@ const GROUPS: usize = 8;
 const EPSILON: f64 = 1e-5;
 /// Peak learning rate.
 const RATE: f64 = 4e-3;
-/// Standard errors on each side of the interval: 95 of 100 normal numbers.
+/// Standard errors on each side of a 95 % interval.
 const STANDARD_ERRORS: f64 = 1.96;
 /// Largest number of patches of one kind in a step.
 const MOST: u64 = 1024;
@@ -33,7 +33,7 @@ const JUDGED: usize = 8;
 pub struct TwoSampleOptions {
     /// Rows and columns of a patch, a multiple of 8, no larger than the images.
     pub patch: usize,
-    /// Steps of training; each sees `batch` patches of each kind.
+    /// Steps of training, each on `batch` patches of each kind.
     pub steps: usize,
     /// Patches of each kind in a step.
     pub batch: usize,
@@ -55,34 +55,32 @@ impl Default for TwoSampleOptions {
 /// Result of a test.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct TwoSample {
-    /// Share of patches of unseen images that the network calls right: ½ where the kinds are alike, 1 where every patch
-    /// tells them apart.
+    /// Share of patches of unseen images that are classified correctly: ½ where the kinds are alike, 1 where no patch is
+    /// mistaken.
     pub accuracy: f64,
-    /// Half of the width of its 95 % interval, from the spread over the unseen images.
+    /// Half-width of its 95 % interval, from the spread over the unseen images.
     pub half_width: f64,
-    /// Distance of both kinds in the feature that the network tells them apart by: the means of its answers to patches of
-    /// unseen images, apart by so many of their standard deviations. Of kinds that are alike 0, and it goes on where the
-    /// accuracy ends at 1; 0 where neither has a deviation.
+    /// Difference of the network's mean outputs for the two kinds, over patches of unseen images, in standard deviations of the
+    /// output. It is 0 where the kinds are alike or the outputs have no deviation, and keeps growing where the accuracy ends
+    /// at 1.
     pub distance: f64,
-    /// Unseen images of both kinds.
+    /// Number of unseen images of both kinds.
     pub images: usize,
 }
 
-/// Trains a small network on the even images of both kinds to tell them apart, and counts how often it is right on patches
-/// of the odd ones.
+/// Trains a small network to classify the even images of two kinds, and measures its accuracy on patches of the odd ones.
 ///
-/// Each patch is taken for its texture alone: its own mean is subtracted, and its own standard deviation divided by.
-/// Patches lie anywhere in the image, the same places for both kinds, and are not turned or mirrored, so that steep fronts
-/// and backs of waves count. The network has two convolutions at the patch's own size, three halvings and the mean of what
-/// is left, 60,000 weights.
+/// Each patch is scaled to mean 0 and standard deviation 1, so that only its texture counts. Patches lie anywhere in the
+/// image, at the same places for both kinds, and are not turned or mirrored, so that steep fronts and backs of waves count.
+/// The network has two convolutions at the patch's own size, three halvings and a global mean, 60,000 weights.
 ///
-/// - `first`, `second`: images of one size, as many of both kinds, at least four; image k of both may show the same scene
-/// - `device`: one that holds no gradients
+/// - `first`, `second`: images of one size, equally many of both kinds, at least four; image k of both may show the same scene
+/// - `device`: device without autodiff
 ///
 /// # Errors
 ///
-/// [`wake_nn::Error::OutOfRange`] for numbers of images, patches or steps that no test can be made of, [`wake_nn::Error::InvalidOption`] for
-/// images of different sizes, [`wake_nn::Error::NotFinite`] for training that diverges.
+/// [`wake_nn::Error::OutOfRange`] for numbers of images, patches or steps out of range, [`wake_nn::Error::InvalidOption`] for
+/// images of different sizes or numbers, [`Error::Diverged`] for training that diverges.
 ///
 /// # References
 ///
@@ -147,7 +145,7 @@ pub fn classifier_two_sample_test(
     })
 }
 
-/// Difference of the means of two sets of numbers in their standard deviation.
+/// Difference of the means of two sets of numbers, in their common standard deviation.
 fn apart(numbers: &[Vec<f64>; 2]) -> f64 {
     let [one, other] = numbers.each_ref().map(|numbers| {
         let count = numbers.len() as f64;
@@ -191,7 +189,7 @@ fn check(first: &[Field], second: &[Field], options: &TwoSampleOptions) -> Resul
     Ok(())
 }
 
-/// Random places of patches, draw number `draw`: image of the first `images`, row and column of the first pixel.
+/// Random places of patches in draw number `draw`: one of the first `images` images, row and column of the first pixel.
 fn places(
     options: &TwoSampleOptions,
     draw: u64,
@@ -242,7 +240,7 @@ fn patches(
     Tensor::from_data(TensorData::new(values, shape), device)
 }
 
-/// Mean 0 and variance 1; all 0 where there is no variance.
+/// Scales values to mean 0 and variance 1, or to 0 where there is no variance.
 fn standardize(values: &mut [f32]) {
     let count = values.len() as f64;
     let mean = values.iter().map(|&v| f64::from(v)).sum::<f64>() / count;
@@ -267,7 +265,7 @@ fn signs(count: usize, device: &Device) -> Tensor<1> {
     Tensor::from_data(TensorData::new(signs, [2 * count]), device)
 }
 
-/// A patch becomes one number: above 0 for the first kind.
+/// Maps a patch to one number, above 0 for the first kind.
 #[derive(Module, Debug)]
 struct Network {
     first: Conv2d,
@@ -332,7 +330,7 @@ mod tests {
 
     const SIDE: usize = 64;
 
-    /// White noise, or the same smoothed along its rows, of mean 3.
+    /// White noise of mean 3, smoothed along its rows if `smoothed`.
     fn images(count: usize, first_seed: u64, smoothed: bool) -> Vec<Field> {
         let one = |seed: u64| {
             let white = NoiseSource::new(seed).normal(0, SIDE * SIDE + 1);
@@ -356,8 +354,8 @@ mod tests {
         seed: 5,
     };
 
-    /// Two halves of one kind cannot be told apart: the accuracy is ½ within four of its standard errors. Smoothed noise is
-    /// told from white by every patch.
+    /// Two sets of one kind cannot be separated: the accuracy is ½ within four standard errors. Smoothed noise is separated from
+    /// white noise in nearly every patch.
     #[test]
     fn what_differs_is_told_apart_and_what_does_not_is_not() {
         let device = Device::flex();
@@ -367,12 +365,12 @@ mod tests {
         assert_eq!(same.images, 16);
         let tolerance = 2.0 * same.half_width.max(0.05);
         assert!((same.accuracy - 0.5).abs() < tolerance, "{same:?}");
-        // 64 patches of each kind: a mean is known to 1/8 of a deviation, the difference of two to √2/8, and four of these.
+        // 64 patches of each kind: the standard error of a mean is 1/8 of a deviation, of the difference √2/8; four of these.
         assert!(same.distance.abs() < 4.0 * 2f64.sqrt() / 8.0, "{same:?}");
         let other =
             classifier_two_sample_test(&white, &images(16, 300, true), &OPTIONS, &device).unwrap();
         assert!(other.accuracy > 0.95, "{other:?}");
-        // Two normal kinds of which 95 of 100 lie on their side of the middle are 2 · 1.645 deviations apart.
+        // Two normal distributions with 95 % on their side of the middle are 2 · 1.645 deviations apart.
         assert!(other.distance > 3.29, "{other:?}");
         let again =
             classifier_two_sample_test(&white, &images(16, 300, true), &OPTIONS, &device).unwrap();

@@ -1,4 +1,4 @@
-//! Checksums: whether bytes are still those that were written.
+//! Checksums to detect changed bytes.
 
 use std::io::{self, Read};
 use std::path::Path;
@@ -13,11 +13,11 @@ pub fn checksum(bytes: &[u8]) -> String {
     format!("{:08x}", crc32fast::hash(bytes))
 }
 
-/// The [`checksum`] of a file, which is read piece by piece.
+/// [`checksum`] of a file, which is read in pieces.
 ///
 /// # Errors
 ///
-/// If it is no regular file or cannot be read.
+/// If the path is not a regular file or cannot be read.
 pub fn file_checksum(path: &Path) -> io::Result<String> {
     let mut file = open_regular(path)?;
     let mut piece = vec![0; 1 << 20];
@@ -30,9 +30,9 @@ pub fn file_checksum(path: &Path) -> io::Result<String> {
     }
 }
 
-/// Appends the entry `crc32`, the [`checksum`] of all text before it, to a JSON object.
+/// Appends an entry `crc32`, the [`checksum`] of all text before it, to a JSON object.
 ///
-/// - `object`: as `serde_json` writes it, on one line or on several, with at least one entry
+/// - `object`: as written by `serde_json`, on one line or several, with at least one entry
 #[must_use]
 pub fn sealed(object: &str) -> String {
     let entries = object.trim_end();
@@ -44,7 +44,7 @@ pub fn sealed(object: &str) -> String {
     }
 }
 
-/// Removes the entry that [`sealed`] appended; `None` if the text has changed since, or was never sealed.
+/// Removes the entry appended by [`sealed`]; `None` if the text was changed since, or never sealed.
 #[must_use]
 pub fn unsealed(text: &str) -> Option<String> {
     let (entries, _) = text.rsplit_once(',')?;

@@ -1,4 +1,4 @@
-//! The one error of this crate.
+//! The error type of this crate.
 
 use std::path::{Path, PathBuf};
 
@@ -10,14 +10,14 @@ pub struct Error {
     pub action: &'static str,
     /// File or folder.
     pub path: PathBuf,
-    /// Error of the system.
+    /// Error of the operating system.
     pub source: std::io::Error,
 }
 
-/// Result of this crate's fallible functions.
+/// Result of a fallible function of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// The error of what was tried with a file or folder.
+/// Makes the error of an action on a file or folder.
 pub fn failed(action: &'static str, path: &Path, source: impl Into<std::io::Error>) -> Error {
     Error {
         action,

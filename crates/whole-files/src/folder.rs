@@ -1,4 +1,4 @@
-//! Folders that belong to one process, cleared of what killed processes left.
+//! Locking of folders, and removal of temporary files of killed processes.
 
 use crate::error::{Result, failed};
 use crate::write::{is_temporary, temporary};
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 ///
-/// [`Error`](crate::Error) if it cannot be made or written to.
+/// [`Error`](crate::Error) if the folder cannot be made or written to.
 pub fn make_folder(folder: &Path) -> Result<()> {
     let fail = |e: std::io::Error| failed("write to the folder", folder, e);
     std::fs::create_dir_all(folder).map_err(fail)?;
@@ -26,11 +26,11 @@ pub struct FolderLock {
 
 /// Makes a folder and locks it for this process.
 ///
-/// On systems that cannot lock folders nothing is locked.
+/// On systems that cannot lock folders, nothing is locked.
 ///
 /// # Errors
 ///
-/// [`Error`](crate::Error) if another process has it, or as [`make_folder`].
+/// [`Error`](crate::Error) if another process holds the lock, or as [`make_folder`].
 pub fn lock_folder(folder: &Path) -> Result<FolderLock> {
     make_folder(folder)?;
     let Ok(handle) = File::open(folder) else {
@@ -56,7 +56,7 @@ pub fn lock_folder(folder: &Path) -> Result<FolderLock> {
 ///
 /// # Errors
 ///
-/// When the folder cannot be read.
+/// If the folder cannot be read.
 pub fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
     let fail = |e| failed("read", folder, e);
     let entries = std::fs::read_dir(folder).map_err(fail)?;
@@ -80,7 +80,7 @@ pub fn sweep(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Whether nobody writes a file any more.
+/// Whether no process is writing a file.
 fn is_abandoned(path: &Path) -> bool {
     File::open(path).is_ok_and(|file| file.try_lock().is_ok())
 }
@@ -89,7 +89,7 @@ fn is_abandoned(path: &Path) -> bool {
 mod tests {
     use super::*;
 
-    /// What is locked is being written; the rest of that name is what a kill left.
+    /// Locked temporary files are being written and are kept; unlocked ones were left by killed processes and are removed.
     #[test]
     fn a_good_run_sweeps_what_dead_ones_left_and_nothing_else() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,18 +1,18 @@
-//! Text files that are read up to a limit, and fingerprints of files.
+//! Reading of regular files, of text up to a size limit, and fingerprints of files.
 
 use crate::error::{Result, failed};
 use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::Path;
 
-/// No text file that is read as a whole is longer than this \[bytes\].
+/// Largest size of a text file \[bytes\].
 const LONGEST_TEXT: u64 = 16 << 20;
 
 /// Reads a text file of at most 16 MiB, such as a configuration or the labels of a folder.
 ///
 /// # Errors
 ///
-/// [`Error`](crate::Error) if it is longer, no regular file, no UTF-8, or cannot be read.
+/// [`Error`](crate::Error) if the file is longer, not a regular file, not UTF-8, or cannot be read.
 pub fn read_text(path: &Path) -> Result<String> {
     let io = |source| failed("read", path, source);
     let mut text = String::new();
@@ -25,20 +25,20 @@ pub fn read_text(path: &Path) -> Result<String> {
     Ok(text)
 }
 
-/// Reads the bytes of a file.
+/// Reads the bytes of a regular file, with the path in the error.
 ///
 /// # Errors
 ///
-/// [`Error`](crate::Error) if it is no regular file or cannot be read.
+/// [`Error`](crate::Error) if the path is not a regular file or cannot be read.
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
     read_regular(path).map_err(|source| failed("read", path, source))
 }
 
-/// Opens a regular file; refuses pipes, whose opening would block.
+/// Opens a regular file; pipes are refused, because opening them would block.
 ///
 /// # Errors
 ///
-/// If it is no regular file or cannot be opened.
+/// If the path is not a regular file or cannot be opened.
 pub fn open_regular(path: &Path) -> io::Result<File> {
     match fs::metadata(path)?.is_file() {
         true => File::open(path),
@@ -50,7 +50,7 @@ pub fn open_regular(path: &Path) -> io::Result<File> {
 ///
 /// # Errors
 ///
-/// If it is no regular file or cannot be read.
+/// If the path is not a regular file or cannot be read.
 pub fn read_regular(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open_regular(path)?.read_to_end(&mut bytes)?;
@@ -61,7 +61,7 @@ pub fn read_regular(path: &Path) -> io::Result<Vec<u8>> {
 ///
 /// # Errors
 ///
-/// [`Error`](crate::Error) if it cannot be read.
+/// [`Error`](crate::Error) if the path is not a regular file or cannot be read.
 ///
 /// # References
 ///

@@ -1,6 +1,6 @@
-//! Foreign text in error messages: one line of limited length, without control characters.
+//! Escaping of untrusted text in error messages: one line of limited length, without control characters.
 
-/// Escapes foreign text for an error message: at most 80 characters, control characters escaped.
+/// Escapes untrusted text for an error message and cuts it to at most 80 characters.
 ///
 /// ```
 /// assert_eq!(whole_files::quoted("a\u{1b}[31mb"), "a\\u{1b}[31mb");
@@ -10,10 +10,10 @@ pub fn quoted(text: &str) -> String {
     shortened(text, 80)
 }
 
-/// Shortens a message that may quote foreign text to one line of at most 400 characters, without its middle.
+/// Shortens a message that may quote untrusted text to one line of at most 400 characters, cutting its middle.
 pub fn sentence(text: &str) -> String {
     let text = text.trim();
-    // A character becomes ten at most; what cannot stay need not be looked at.
+    // Cut long texts before escaping.
     if text.len() <= 400 {
         return shortened(text, 400);
     }
@@ -28,7 +28,7 @@ pub fn sentence(text: &str) -> String {
     )
 }
 
-/// The first `longest` characters, escaped where they would not be one printed character.
+/// Escapes control and invisible characters, and cuts the result to `longest` characters.
 fn shortened(text: &str, longest: usize) -> String {
     let mut short = String::new();
     let mut count = 0;
@@ -51,7 +51,7 @@ fn shortened(text: &str, longest: usize) -> String {
     short
 }
 
-/// Characters that turn the direction of a line, or are nothing to see.
+/// Whether a character is invisible or changes the direction of a line.
 fn is_invisible(character: char) -> bool {
     matches!(character, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}')
 }

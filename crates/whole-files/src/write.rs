@@ -1,6 +1,6 @@
 //! Atomic file writing.
 //!
-//! A file is written under another name, `.NAME.PROCESS-NUMBER.tmp`, and locked while it is; then it takes its own name.
+//! A file is written and locked under a temporary name, `.NAME.PROCESS-NUMBER.tmp`, and renamed when it is complete.
 
 use crate::error::{Result, failed};
 use serde::Serialize;
@@ -9,23 +9,23 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Tells apart the files that one process writes at the same time.
+/// Number that distinguishes files written by one process at the same time.
 static COUNTER: AtomicU64 = AtomicU64::new(0);
 
-/// Writes bytes to a temporary file and renames it: the file is complete, or as it was before.
+/// Writes bytes to a temporary file and renames it, so that the file is either complete or unchanged.
 ///
 /// # Errors
 ///
-/// [`Error`](crate::Error); the neighbour is removed.
+/// [`Error`](crate::Error) if writing fails; the temporary file is removed.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     write_with(path, |file| file.write_all(bytes)).map_err(|e| failed("write", path, e))
 }
 
-/// Writes a file piece by piece; the file gets its name when all of it is on disk.
+/// Writes a file in pieces; the file gets its name when it is complete.
 ///
 /// # Errors
 ///
-/// Those of the system and of `write`; what was written is removed.
+/// Errors of the system and of `write`; the temporary file is removed.
 pub fn write_with(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
@@ -40,23 +40,23 @@ pub fn write_with(
         })
         .and_then(|file| {
             std::fs::rename(&neighbour, path)?;
-            // Locked up to here.
+            // The lock ends here.
             drop(file);
             Ok(())
         });
     if written.is_err() {
-        // The write failed already; what is left of it is the lesser trouble.
+        // The error of the write is returned; a failed removal is ignored.
         let _ = std::fs::remove_file(&neighbour);
     }
     written
 }
 
-/// Writes a file piece by piece, whole or not at all, in a folder that is made where it is missing; its bytes are on disk
-/// when this returns.
+/// Writes a file in pieces, completely or not at all, making its folder if it is missing; the bytes are synced to disk on
+/// return.
 ///
 /// # Errors
 ///
-/// [`Error`](crate::Error); what was written is removed.
+/// [`Error`](crate::Error) if writing fails; the temporary file is removed.
 pub fn write_synced(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
@@ -77,33 +77,33 @@ pub fn write_synced(
 ///
 /// # Errors
 ///
-/// [`Error`](crate::Error).
+/// [`Error`](crate::Error) if encoding or writing fails.
 pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     let mut text = serde_json::to_string_pretty(value).map_err(|e| failed("encode", path, e))?;
     text.push('\n');
     write_atomically(path, text.as_bytes())
 }
 
-/// Whether a name is that of a temporary file of this crate.
+/// Whether a path has the name of a temporary file of this crate.
 pub fn is_temporary(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     name.starts_with('.') && name.ends_with(".tmp")
 }
 
-/// A new file beside `path`, locked; the lock ends with the file.
+/// Makes a locked temporary file beside `path`; closing the file releases the lock.
 pub(crate) fn temporary(path: &Path) -> std::io::Result<(PathBuf, File)> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     loop {
         let number = COUNTER.fetch_add(1, Ordering::Relaxed);
         let neighbour = path.with_file_name(format!(".{name}.{}-{number}.tmp", std::process::id()));
         let file = match File::create_new(&neighbour) {
-            // Left by a process that had this number.
+            // Left by an earlier process with the same number.
             Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => continue,
             other => other?,
         };
-        // Where the system has no locks, nothing is swept either.
+        // On systems without locks, nothing is swept either.
         let _ = file.lock();
-        // Between its making and its lock another process may have swept it.
+        // Another process may have swept the file before it was locked.
         if neighbour.exists() {
             return Ok((neighbour, file));
         }

@@ -1,31 +1,32 @@
-//! The command line.
+//! Arguments of `wake bench`.
 
 use super::stages::STAGES;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
-/// Measure every fast method of the simulator against its slow oracle.
+/// Measure speed and error of the simulator's fast methods against their slow oracles.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Folder of the results, made if absent
+    /// Folder for the results, created if absent
     #[arg(long, value_name = "DIR", default_value = "out/bench")]
     pub(crate) out: PathBuf,
     /// Print {"rows": [...]} on standard output, and nothing else
     #[arg(long)]
     pub(crate) json: bool,
-    /// Largest size of the sweep over sizes, 128 to 2048 [pixels]
+    /// Largest size of the sweep over sizes, 128 to 2048 (pixels)
     #[arg(long, default_value_t = 2048, value_parser = clap::value_parser!(u32).range(128..=2048))]
     pub(crate) largest: u32,
-    /// What to measure
+    /// Part to measure
     #[arg(long, value_enum, default_value = "all")]
     pub(crate) part: Part,
-    /// Where the loader's model and the blocks compute: flex, ndarray, wgpu or cuda, where compiled in
+    /// Device of the loader's model and of the blocks: flex, ndarray, wgpu or cuda, if compiled in
     #[arg(long, default_value = "flex")]
     pub(crate) device: String,
-    /// Stages of the simulator alone, without spacing, model, loader and schedulers [repeatable; default: all]
+    /// Measure only this stage of the simulator, without spacing, model, loader and schedulers [repeatable; default:
+    /// all]
     #[arg(long, value_name = "STAGE", value_parser = STAGES)]
     pub(crate) stage: Vec<String>,
-    /// With --part device: blocks whose names contain this alone [repeatable; default: all]
+    /// With --part device: measure only blocks whose names contain this [repeatable; default: all]
     #[arg(long, value_name = "NAME")]
     pub(crate) block: Vec<String>,
 }
@@ -33,13 +34,13 @@ pub(crate) struct Arguments {
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Part {
     All,
-    /// The fast methods of the simulator
+    /// Fast methods of the simulator
     Simulator,
     /// The model
     Model,
-    /// Images per second of the data set's loader
+    /// Images per second of the data set loader
     Loader,
-    /// Schedulers of Stable Diffusion, steps against error on a problem with a known answer
+    /// Schedulers of Stable Diffusion: steps against error on a problem with a known answer
     Schedulers,
     /// Blocks of the networks on --device against flex (not part of all)
     Device,

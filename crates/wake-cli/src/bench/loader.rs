@@ -1,4 +1,4 @@
-//! Images a second through the data set's loader, as a training loop gets them.
+//! Images per second of the data set loader, as in a training loop.
 
 use serde::Serialize;
 use std::sync::Arc;
@@ -9,41 +9,41 @@ use wake_nn::device_named;
 
 use crate::exit::Outcome;
 
-/// Threads that make batches, as many as there are cores at most; on each the physics of one batch is computed while the device draws
-/// another.
+/// Numbers of threads that make batches, limited by the number of cores; each computes the physics of one batch while
+/// the device draws another.
 const THREADS: [usize; 5] = [1, 2, 4, 8, 16];
-/// Images of a batch.
+/// Images per batch.
 const BATCH: usize = 16;
-/// Batches that are timed, after as many as there are threads.
+/// Batches that are timed, after as many warm-up batches as there are threads.
 const BATCHES: usize = 8;
-/// The seed of both sources; the scenes are those of the recipe `satellites`.
+/// Seed of both sources, whose scenes are those of the recipe `satellites`.
 const SEED: u64 = 3;
 
-/// One source through the loader.
+/// Speed of one source through the loader.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct LoaderRow {
     pub(crate) stage: &'static str,
-    /// Who makes the images: the simulator or the model, of the same scenes.
+    /// Source of the images, the simulator or the model, with the same scenes.
     pub(crate) source: &'static str,
-    /// Where the model computes and the batches end.
+    /// Device of the model and of the batches.
     pub(crate) device: String,
     pub(crate) threads: usize,
     pub(crate) batch: usize,
     pub(crate) images_per_second: f64,
 }
 
-/// Number of times that [`measure`] says it has done something.
+/// Number of calls of `done` in [`measure`].
 pub(crate) fn parts() -> u64 {
     2 * threads().count() as u64
 }
 
-/// Those of [`THREADS`] that this machine has cores for.
+/// Entries of [`THREADS`] that this machine has cores for.
 fn threads() -> impl Iterator<Item = usize> {
     let cores = rayon::current_num_threads();
     THREADS.into_iter().filter(move |&threads| threads <= cores)
 }
 
-/// All rows; `done` hears of each.
+/// Measures all rows and calls `done` after each.
 pub(crate) fn measure(device: &str, done: impl Fn()) -> Outcome<Vec<LoaderRow>> {
     let scenes = Simulated::new(Recipe::satellites()?, SEED)?;
     let sampler = WakeSampler::pretrained(&device_named(device)?)?;
@@ -69,7 +69,7 @@ pub(crate) fn measure(device: &str, done: impl Fn()) -> Outcome<Vec<LoaderRow>> 
     Ok(rows)
 }
 
-/// Images a second of a loop that does nothing with them.
+/// Images per second of a loop that does nothing with them.
 fn images_per_second(source: Arc<dyn Source>, threads: usize, device: &str) -> Outcome<f64> {
     let loader = Loader::new(source).batch(BATCH).threads(threads);
     let mut batches = loader.on(&device_named(device)?)?;
@@ -83,7 +83,7 @@ fn images_per_second(source: Arc<dyn Source>, threads: usize, device: &str) -> O
     Ok((BATCH * BATCHES) as f64 / begin.elapsed().as_secs_f64())
 }
 
-/// The rows as a table in Markdown: images a second by the number of threads.
+/// Markdown table of images per second by number of threads.
 pub(crate) fn table(rows: &[LoaderRow]) -> String {
     let cores = rayon::current_num_threads();
     let mut text =

@@ -1,12 +1,12 @@
-//! `wake bench`: every fast method against its oracle: seconds, error, and the frontier.
+//! `wake bench`: measures speed and error of every fast method against its oracle.
 //!
-//! The first part is the simulator. Sea and wake get the 10⁴ strongest waves of the default scene, the paper's own method
-//! and scale; the oracle of both is the harmonic sum, the strong baseline the same sum as a matrix product. Where an
-//! oracle is too slow for all pixels it runs on random ones of the same size, as many as the table says, and its time is
-//! scaled up; that of the whole scene stage by stage. One image on finer and finer pixels shows what its spacing does. The
-//! second part is the model: steps, batch size and weights against many steps from the same noise. The third is the loader:
-//! images a second that a training loop gets of the simulator and of the model, by threads. The fourth is Stable Diffusion's
-//! schedulers, on a problem whose answer is known.
+//! The first part is the simulator. Sea and wake use the 10⁴ strongest waves of the default scene, the paper's own
+//! method and scale; the oracle of both is the harmonic sum, and the strong baseline is the same sum as a matrix
+//! product. An oracle that is too slow for all pixels runs on random pixels of the image, as many as the table says,
+//! and its time is scaled up; the time of the whole scene is scaled stage by stage. One image on finer and finer pixels
+//! shows the effect of the spacing. The second part is the model: steps, batch size and weights against many steps from
+//! the same noise. The third is the loader: images per second of the simulator and of the model in a training loop, by
+//! threads. The fourth is Stable Diffusion's schedulers, on a problem with a known answer.
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
@@ -33,7 +33,8 @@ use serde_json::{Value, json};
 use crate::exit::{self, Outcome};
 use crate::progress;
 
-/// Writes `report.json`, `simulator.md`, `simulator.csv`, `spacing.md`, `model.md`, `loader.md`, `schedulers.md`, `frontier.svg` and `model.svg` (log-log).
+/// Writes `report.json`, `simulator.md`, `simulator.csv`, `spacing.md`, `model.md`, `loader.md`, `schedulers.md`,
+/// `frontier.svg` and `model.svg` (log-log); with `--part device`, `device.json` and `device.md`.
 pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     let out = &arguments.out;
     whole_files::make_folder(out)?;
@@ -86,7 +87,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
         let measured = device::measure(&arguments.device, &arguments.block, |of_block| {
             bar.inc(1);
             lines.extend_from_slice(of_block);
-            // What was measured stays where a driver ends the process.
+            // Results so far are kept even if a driver ends the process.
             Ok(whole_files::write_json(&out.join("device.json"), &lines)?)
         })?;
         bar.finish_and_clear();
@@ -113,7 +114,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     Ok(())
 }
 
-/// Adds measured rows to those of the report.
+/// Adds measured rows to the report.
 fn add(rows: &mut Vec<Value>, measured: &[impl Serialize]) -> serde_json::Result<()> {
     for row in measured {
         rows.push(serde_json::to_value(row)?);

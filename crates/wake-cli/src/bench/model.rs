@@ -1,4 +1,4 @@
-//! The model: steps, batch size and rounded weights against many steps from the same noise.
+//! Speed and error of the model by steps, batch size and weight precision, against many steps from the same noise.
 
 use super::model_row::{ModelRow, REFERENCE, STEPS};
 use super::reference::{Reference, draw};
@@ -10,10 +10,10 @@ use wake_physics::Scene;
 
 use crate::exit::Outcome;
 
-/// Images at a time, at the sampler's own number of steps.
+/// Batch sizes, at the sampler's own number of steps.
 const BATCHES: [usize; 2] = [4, 16];
 
-/// All rows; `done` hears of each.
+/// Measures all rows and calls `done` after each.
 pub(crate) fn measure(done: impl Fn()) -> Outcome<Vec<ModelRow>> {
     let sampler = WakeSampler::pretrained(&Device::default())?;
     let own = sampler.steps();
@@ -45,10 +45,10 @@ pub(crate) fn measure(done: impl Fn()) -> Outcome<Vec<ModelRow>> {
     Ok(rows)
 }
 
-/// Number of times that [`measure`] says it has done something.
+/// Number of calls of `done` in [`measure`].
 pub(crate) const PARTS: usize = 1 + STEPS.len() + BATCHES.len() + Rounding::ALL.len();
 
-/// Four seas with ships of other speeds and headings.
+/// Four scenes with different seas, ship speeds and headings.
 fn scenes(sampler: &WakeSampler) -> Vec<Scene> {
     let values = [
         (45.0, 10.0, 5.0, 90.0, 32.0),

@@ -1,39 +1,39 @@
-//! Rows of the model: one per number of steps, batch size and rounding.
+//! Rows of the model by number of steps, batch size and weight precision.
 
 use super::row::Row;
 use serde::Serialize;
 
 /// Steps of the reference.
 pub(crate) const REFERENCE: usize = 100;
-/// Numbers of steps; each image alone, weights as they ship.
+/// Numbers of steps, with single images and the shipped weights.
 pub(crate) const STEPS: [usize; 6] = [1, 2, 3, 4, 8, 16];
 
-/// One way to draw images against the reference.
+/// Comparison of one way to draw images with the reference.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct ModelRow {
-    /// Seconds are those of one image; the oracle is the same model with [`REFERENCE`] steps, one image at a time.
-    /// Errors are those of grey, relative to the reference's standard deviation.
+    /// Seconds are per image; the oracle is the same model with [`REFERENCE`] steps, one image at a time. Errors are
+    /// errors of grey, relative to the reference's standard deviation.
     #[serde(flatten)]
     pub(crate) row: Row,
     /// Steps from noise to image.
     pub(crate) steps: usize,
-    /// How a step is made.
+    /// Method of a step.
     pub(crate) sampler: &'static str,
-    /// Bits of the weights; all arithmetic is in f32.
+    /// Number format of the weights; all arithmetic is in f32.
     pub(crate) precision: &'static str,
-    /// Images at a time.
+    /// Images per batch.
     pub(crate) batch: usize,
     /// Largest difference of the mean radial spectrum up to half the Nyquist frequency \[dB\].
     pub(crate) spectrum_db: f64,
 }
 
-/// The rows of the steps alone, for a plot.
+/// The rows of different steps, for a plot.
 pub(crate) fn steps(rows: &[ModelRow]) -> Vec<Row> {
     let steps = rows.iter().take(STEPS.len());
     steps.map(|row| row.row.clone()).collect()
 }
 
-/// The rows as a table in Markdown.
+/// Markdown table of the rows.
 pub(crate) fn table(rows: &[ModelRow]) -> String {
     let mut text =
         "| steps | sampler | weights | batch | ms per image | ratio | max error | rms error | spectrum dB |\n\

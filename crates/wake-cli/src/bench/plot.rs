@@ -1,4 +1,4 @@
-//! The log-log plot: seconds against error, each stage with its oracle.
+//! Log-log plot of seconds against error, each stage with its oracle.
 
 use super::row::Row;
 use plotters::prelude::*;
@@ -9,13 +9,13 @@ use crate::exit::Outcome;
 /// Pixels along a side of the simulator's frontier.
 pub(crate) const FRONTIER_SIZE: usize = 512;
 
-/// What a plot shows.
+/// Content of a plot.
 pub(crate) struct Chart {
     caption: &'static str,
-    /// Pixels along a side of its rows, and their stages.
+    /// Pixels along a side of the rows shown, and their stages.
     size: usize,
     stages: &'static [(&'static str, RGBColor)],
-    /// Smallest and largest error, seconds.
+    /// Ranges of error and of seconds.
     errors: [f64; 2],
     seconds: [f64; 2],
 }
@@ -39,7 +39,7 @@ pub(crate) const SIMULATOR: Chart = Chart {
     seconds: [1e-4, 1e4],
 };
 
-/// Steps of the model.
+/// The model by number of steps.
 pub(crate) const MODEL: Chart = Chart {
     caption: "Speed against error, 1 to 16 steps of the model, 256 x 256 pixels",
     size: 256,
@@ -48,7 +48,7 @@ pub(crate) const MODEL: Chart = Chart {
     seconds: [1e-2, 1e2],
 };
 
-/// Draws rows: fast methods as joined dots, oracles as crosses of the same colour at their time.
+/// Plots rows: fast methods as joined dots, oracles as crosses of the same colour at their own time.
 pub(crate) fn draw(path: &Path, plot: &Chart, rows: &[Row]) -> Outcome<()> {
     let rows: Vec<&Row> = rows.iter().filter(|r| r.size == plot.size).collect();
     let area = SVGBackend::new(path, (900, 620)).into_drawing_area();

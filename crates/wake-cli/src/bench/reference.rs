@@ -1,4 +1,4 @@
-//! Images that the model draws in many steps, and others of the same noise beside them.
+//! Reference images of the model with many steps, and comparisons with images of the same noise.
 
 use super::model_row::ModelRow;
 use super::row::{Errors, Row, median_seconds};
@@ -8,21 +8,21 @@ use wake_physics::{Field, Scene};
 
 use crate::exit::Outcome;
 
-/// Runs of which the median counts.
+/// Timed runs, of which the median is reported.
 const RUNS: usize = 3;
-/// Smallest power of a ring, so that a constant image has a logarithm.
+/// Smallest power of a ring, which keeps logarithms of constant images finite.
 const LEAST_POWER: f64 = 1e-6;
 
 /// The same model with many steps, one image at a time.
 pub(crate) struct Reference {
     pub(crate) scenes: Vec<Scene>,
     pub(crate) images: Vec<Field>,
-    /// For one image.
+    /// Seconds per image.
     pub(crate) seconds: f64,
 }
 
 impl Reference {
-    /// One way to draw, beside it.
+    /// Compares a sampler with the reference.
     pub(crate) fn row(
         &self,
         sampler: &WakeSampler,
@@ -54,7 +54,7 @@ impl Reference {
         })
     }
 
-    /// Over all images together.
+    /// Errors over all images together.
     fn errors(&self, images: &[Field]) -> Errors {
         let all = |images: &[Field]| -> Vec<f64> {
             let values = images.iter().flat_map(|image| &image.values);
@@ -74,7 +74,7 @@ impl Reference {
         Errors::of(all(images).into_iter(), &exact, deviation)
     }
 
-    /// The largest difference of the mean spectra in dB.
+    /// Largest difference of the mean spectra \[dB\].
     fn spectrum_db(&self, images: &[Field]) -> f64 {
         let half = self.images[0].rows.min(self.images[0].columns) / 4;
         let mut difference = vec![0.0; half + 1];
@@ -93,7 +93,7 @@ impl Reference {
     }
 }
 
-/// Draws the scenes, again from the first where a batch has more; image k has the seed k, whatever the batch.
+/// Draws the scenes, repeated if a batch is larger; image k has the seed k, whatever the batch size.
 pub(crate) fn draw(
     sampler: &WakeSampler,
     scenes: &[Scene],

@@ -1,4 +1,4 @@
-//! The model in the crate with its weights rounded further.
+//! The shipped model with weights rounded further.
 
 use safetensors::SafeTensors;
 use safetensors::tensor::{Dtype, TensorView};
@@ -8,12 +8,12 @@ use wake_nn::burn::tensor::{Device, bf16, f16};
 
 use crate::exit::Outcome;
 
-/// Coarser weights than the 16 bits (10 of them for the fraction) of the file.
+/// Precision of weights coarser than the file's 16 bits (10 of them for the fraction).
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Rounding {
     /// 16 bits, 7 of them for the fraction.
     Bf16,
-    /// 8 bits and a scale for each row of a matrix (each output channel).
+    /// 8 bits, with a scale for each row of a matrix (each output channel).
     Int8,
 }
 
@@ -32,7 +32,7 @@ impl Rounding {
             Self::Bf16 => values
                 .iter_mut()
                 .for_each(|v| *v = bf16::from_f32(*v).to_f32()),
-            // Biases and scales of norms are few, and keep their bits.
+            // Biases and scales of norms are few and are not rounded.
             Self::Int8 if shape.len() < 2 => {}
             Self::Int8 => {
                 let row: usize = shape[1..].iter().product();
@@ -50,7 +50,7 @@ fn to_8_bits(row: &mut [f32]) {
     }
 }
 
-/// The model in the crate with rounded weights; it computes in f32 all the same.
+/// The shipped model with rounded weights; it still computes in f32.
 pub(crate) fn rounded(rounding: Rounding) -> Outcome<WakeSampler> {
     let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../wake-ldm/assets");
     let folder = tempfile::tempdir()?;
@@ -69,7 +69,7 @@ pub(crate) fn rounded(rounding: Rounding) -> Outcome<WakeSampler> {
     Ok(WakeSampler::from_folder(folder.path(), &Device::default())?)
 }
 
-/// A weight file with its numbers rounded, as f32; what is no floating-point number stays.
+/// A weight file with its numbers rounded, as f32; other tensors stay unchanged.
 fn round_file(rounding: Rounding, bytes: &[u8]) -> Outcome<Vec<u8>> {
     let file = SafeTensors::deserialize(bytes)?;
     let mut tensors = Vec::new();

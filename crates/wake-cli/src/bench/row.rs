@@ -1,41 +1,41 @@
-//! One measured row, and how it is timed.
+//! Measured row, and timing functions.
 
 use serde::Serialize;
 use std::time::Instant;
 
-/// One fast method against its oracle.
+/// Comparison of one fast method with its oracle.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Row {
     /// Stage of the data flow.
     pub(crate) stage: &'static str,
     /// Pixels along each side.
     pub(crate) size: usize,
-    /// Tolerance asked for, where the method has one.
+    /// Requested tolerance, if the method has one.
     pub(crate) tolerance: Option<f64>,
-    /// Seconds of the fast method: the median of several runs.
+    /// Seconds of the fast method, the median of several runs.
     pub(crate) fast_seconds: f64,
     /// Seconds of the oracle.
     pub(crate) oracle_seconds: f64,
-    /// Pixels at which the oracle ran and errors are measured; where they are not all, its time was scaled up.
+    /// Pixels at which the oracle ran and errors are measured; if these are not all pixels, its time was scaled up.
     pub(crate) pixels: usize,
-    /// Seconds of the same sum as a matrix product, where there is one; scaled up from some rows above 256².
+    /// Seconds of the same sum as a matrix product, if there is one; scaled up from some rows above 128².
     pub(crate) matrix_product_seconds: Option<f64>,
-    /// Oracle over fast seconds.
+    /// Oracle seconds over fast seconds.
     pub(crate) ratio: f64,
-    /// Largest error, relative to the root mean square (fields) or the mean (σ⁰, image); over all quantities.
+    /// Largest error relative to the root mean square (fields) or the mean (σ⁰, image), over all quantities.
     pub(crate) max_error: f64,
-    /// Root mean square error, likewise.
+    /// Root mean square error, relative to the same scale.
     pub(crate) rms_error: f64,
 }
 
 impl Row {
-    /// Whether the oracle ran on some pixels only.
+    /// Whether the oracle ran on only some of the pixels.
     pub(crate) fn extrapolated(&self) -> bool {
         self.pixels < self.size * self.size
     }
 }
 
-/// The widest vector instructions of this machine, of those that fast methods use.
+/// The widest vector instructions of this machine that the fast methods use.
 pub(crate) fn instruction_set() -> &'static str {
     #[cfg(target_arch = "x86_64")]
     {
@@ -49,7 +49,7 @@ pub(crate) fn instruction_set() -> &'static str {
     std::env::consts::ARCH
 }
 
-/// Median seconds of `runs` calls after one that is not counted, and the last result.
+/// Median seconds of `runs` calls after a warm-up call, and the last result.
 pub(crate) fn median_seconds<T>(runs: usize, mut call: impl FnMut() -> T) -> (f64, T) {
     let mut result = call();
     let mut seconds: Vec<f64> = (0..runs)
@@ -70,7 +70,7 @@ pub(crate) fn seconds<T>(call: impl FnOnce() -> T) -> (f64, T) {
     (start.elapsed().as_secs_f64(), result)
 }
 
-/// Largest and root-mean-square error of some values against exact ones.
+/// Largest and root mean square error of values against exact ones.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Errors {
     pub(crate) max: f64,
@@ -93,7 +93,7 @@ impl Errors {
         }
     }
 
-    /// The larger of each.
+    /// The larger of each error.
     pub(crate) fn worst(self, other: Self) -> Self {
         Self {
             max: self.max.max(other.max),

@@ -1,14 +1,14 @@
-//! Schedulers of Stable Diffusion: calls of the model against error, where the right answer is known.
+//! Schedulers of Stable Diffusion: model calls against error, on a problem with a known answer.
 //!
-//! The model is exact. Each pixel x₀ is Gaussian with a mean and a standard deviation s of its own, so the best prediction of the noise in
-//! x = α x₀ + σ n is
+//! The model is exact. Each pixel x₀ is Gaussian with its own mean μ and standard deviation s, so the best prediction
+//! of the noise in x = α x₀ + σ n is
 //!
 //! ```text
 //! n̂ = σ (x − α μ)/(α² s² + σ²)
 //! ```
 //!
-//! and the probability flow keeps (x − α μ)/√(α² s² + σ²), so it ends at a known image. With several s the solution is no straight line for any
-//! parametrisation.
+//! and the probability flow keeps (x − α μ)/√(α² s² + σ²) constant, so it ends at a known image. With several s the
+//! solution is not a straight line for any parametrisation.
 
 use std::path::Path;
 
@@ -20,7 +20,8 @@ use wake_nn::burn::tensor::{Device, Tensor, TensorData};
 
 use crate::exit::Outcome;
 
-/// Deterministic methods, some also with the noise levels of Karras et al. (2022); the others draw noise of their own.
+/// Deterministic methods, some also with the noise levels of Karras et al. (2022); the other schedulers add random
+/// noise.
 const METHODS: [(&str, bool); 9] = [
     ("ddim", false),
     ("pndm", false),
@@ -38,10 +39,10 @@ const STEPS: [usize; 7] = [5, 10, 20, 30, 50, 100, 200];
 const REFERENCE: usize = 1000;
 /// Pixels along each side.
 const SIDE: usize = 64;
-/// Standard deviations of the pixels, from the first to the last in equal ratios.
+/// Smallest and largest standard deviation of the pixels, which form a geometric series.
 const SPREADS: [f64; 2] = [0.3, 2.0];
 
-/// One method with a number of steps.
+/// Error of one method with a number of steps.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct SchedulerRow {
     pub(crate) stage: &'static str,
@@ -49,16 +50,16 @@ pub(crate) struct SchedulerRow {
     /// Noise levels of Karras et al. (2022), Eq. 5.
     pub(crate) karras: bool,
     pub(crate) steps: usize,
-    /// Calls of the model.
+    /// Number of model calls.
     pub(crate) calls: usize,
-    /// Root mean square difference from the end of the exact flow, over the standard deviation of each pixel.
+    /// Root mean square difference from the end of the exact flow, relative to the standard deviation of each pixel.
     pub(crate) rms_error: f64,
 }
 
-/// Number of times that [`measure`] says it has done something.
+/// Number of calls of `done` in [`measure`].
 pub(crate) const PARTS: usize = METHODS.len() * STEPS.len() + 1;
 
-/// All rows, the reference of many DDIM steps last; `done` hears of each.
+/// Measures all rows, the reference of many DDIM steps last, and calls `done` after each.
 pub(crate) fn measure(done: impl Fn()) -> Outcome<Vec<SchedulerRow>> {
     let problem = Problem::new();
     let runs = METHODS
@@ -72,7 +73,7 @@ pub(crate) fn measure(done: impl Fn()) -> Outcome<Vec<SchedulerRow>> {
     Ok(rows)
 }
 
-/// Pixels with their means and deviations, and the noise that all runs begin with.
+/// Means and standard deviations of the pixels, and the initial noise of all runs.
 struct Problem {
     mean: Tensor<4>,
     spread: Tensor<4>,
@@ -84,7 +85,7 @@ impl Problem {
         let mut random = StdRng::seed_from_u64(1);
         let count = SIDE * SIDE;
         let ratio = (SPREADS[1] / SPREADS[0]).ln() / (count - 1) as f64;
-        // Twelve uniform numbers have the variance 1.
+        // The sum of twelve uniform numbers has variance 1.
         let mut gaussian = || (0..12).map(|_| random.random_range(0.0..1.0)).sum::<f64>() - 6.0;
         let tensor = |values: Vec<f64>| {
             let data = TensorData::new(values, [1, 1, SIDE, SIDE]);
@@ -109,7 +110,7 @@ impl Problem {
 
     fn row(&self, (method, karras): (&'static str, bool), steps: usize) -> Outcome<SchedulerRow> {
         let mut options = SchedulerConfig::stable_diffusion(method)?.to_json();
-        // The last step leads to the clean image, as with the methods that end without noise.
+        // The last step ends at the clean image, as in the methods that end without noise.
         options["set_alpha_to_one"] = true.into();
         if steps == REFERENCE {
             options["steps_offset"] = 0.into();
@@ -120,7 +121,7 @@ impl Problem {
         let mut scheduler = config.scheduler(steps)?;
         let calls = scheduler.timesteps().len();
         let mut sample = self.noise.clone() * scheduler.init_noise_sigma();
-        // The end of the exact flow from the first sample.
+        // Standardized deviation from the mean, which the exact flow keeps.
         let first = scheduler.noise_level(0);
         let off = (sample.clone() - self.mean.clone() * first.signal) / self.width(first);
         for index in 0..calls {
@@ -150,7 +151,7 @@ impl Problem {
     }
 }
 
-/// The errors by method and steps.
+/// Markdown table of the errors by method and steps.
 pub(crate) fn table(rows: &[SchedulerRow]) -> String {
     let heads: Vec<String> = STEPS.iter().map(usize::to_string).collect();
     let mut text = format!(
@@ -187,7 +188,7 @@ pub(crate) fn table(rows: &[SchedulerRow]) -> String {
 mod tests {
     use super::*;
 
-    /// DDIM's error falls with the number of steps; LMS, of fourth order, is far more exact.
+    /// DDIM's error falls with the number of steps; LMS, a method of fourth order, is far more accurate.
     #[test]
     fn methods_converge_with_their_orders() {
         let problem = Problem::new();

@@ -1,34 +1,35 @@
-//! The spacing computed on: error and seconds of one image on finer and finer pixels, and the order of convergence.
+//! Effect of the computed pixel spacing: error and seconds of one image on finer and finer pixels, and order of
+//! convergence.
 
 use super::row::median_seconds;
 use serde::Serialize;
 use wake_physics::{Field, Result, Scene, Simulator};
 
-/// Pixels of 20 m that are divided by these along each side; the last is what the others are compared with.
+/// Divisions of pixels of 20 m along each side; the last is the reference for the others.
 const DIVISIONS: [u32; 5] = [2, 3, 4, 6, 12];
 /// Number of images measured.
 pub(crate) const COUNT: u64 = DIVISIONS.len() as u64;
 
-/// Runs of each.
+/// Timed runs of each spacing.
 const RUNS: usize = 3;
 
-/// One spacing.
+/// Figures of one spacing.
 #[derive(Debug, Serialize)]
 pub(crate) struct SpacingRow {
     stage: &'static str,
-    /// Of the computed pixels \[m\].
+    /// Computed spacing \[m\].
     spacing: f64,
     /// Whether the plan chooses it.
     chosen: bool,
     seconds: f64,
-    /// Root mean square of the difference to the finest, over the mean \[1\].
+    /// Root mean square difference from the finest spacing, over the mean \[1\].
     error: f64,
-    /// Logarithm of the ratio of two errors over that of their spacings, this one's and the next finer one's.
+    /// Order of convergence: logarithm of the ratio of this error to the next finer one's, over that of their spacings.
     order: Option<f64>,
 }
 
-/// A ship of 6.5 m/s under a response of 20 m at C band: its waves on the arms are 18 m long. The mean over all seas: no draw
-/// of the sea blurs the comparison.
+/// A ship of 6.5 m/s with a response of 20 m at C band: the waves on its arms are 18 m long. Images are means over all
+/// seas, so no random sea blurs the comparison.
 fn scene(divisions: Option<u32>) -> Result<Scene> {
     let keys = [
         "grid.rows=96",
@@ -80,7 +81,7 @@ pub(crate) fn measure(mut done: impl FnMut()) -> Result<Vec<SpacingRow>> {
     Ok(measured.iter().enumerate().map(row).collect())
 }
 
-/// The rows as a table in Markdown.
+/// Markdown table of the rows.
 pub(crate) fn table(rows: &[SpacingRow]) -> String {
     let mut text = String::from(
         "| spacing computed on | seconds | error | order |\n| ---: | ---: | ---: | ---: |\n",

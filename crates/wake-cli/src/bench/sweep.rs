@@ -1,4 +1,4 @@
-//! The simulator's stages over sizes and tolerances.
+//! Sweep of the simulator's stages over sizes and tolerances.
 
 use super::plot;
 use super::row::{Row, instruction_set};
@@ -6,13 +6,13 @@ use super::stages::{self, Memo, STAGES, has_tolerance};
 use crate::progress;
 use std::cmp::Ordering;
 
-/// Sizes of the sweep at the default tolerance.
+/// Sizes measured at the default tolerance.
 const SIZES: [usize; 5] = [128, 256, 512, 1024, 2048];
-/// Tolerances of the sweep at [`plot::FRONTIER_SIZE`].
+/// Tolerances measured at [`plot::FRONTIER_SIZE`].
 const TOLERANCES: [f64; 5] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5];
 const DEFAULT_TOLERANCE: f64 = 1e-3;
 
-/// The rows of some stages of the simulator, of all where none is named.
+/// Measures the named stages of the simulator, or all if none is named.
 pub(crate) fn measure(largest: usize, stages: &[String]) -> wake_physics::Result<Vec<Row>> {
     let mut cases: Vec<(usize, f64)> = TOLERANCES.map(|t| (plot::FRONTIER_SIZE, t)).to_vec();
     let sizes = SIZES.into_iter().filter(|&n| n <= largest);
@@ -42,8 +42,7 @@ pub(crate) fn measure(largest: usize, stages: &[String]) -> wake_physics::Result
     Ok(rows)
 }
 
-/// The rows of [`plot::FRONTIER_SIZE`] at the default tolerance as a table in Markdown, under the instruction set that they were
-/// measured with.
+/// Markdown table of the rows of [`plot::FRONTIER_SIZE`] at the default tolerance, with threads and instruction set.
 pub(crate) fn table(rows: &[Row]) -> String {
     let threads = rayon::current_num_threads();
     let size = plot::FRONTIER_SIZE;
@@ -98,13 +97,13 @@ pub(crate) fn csv(rows: &[Row]) -> String {
     text
 }
 
-/// Milliseconds of the matrix product, where there is one.
+/// Milliseconds of the matrix product, if there is one.
 fn product(row: &Row) -> String {
     let seconds = row.matrix_product_seconds;
     seconds.map_or(String::new(), |s| figures(1e3 * s))
 }
 
-/// A number in at most three figures, so that none seems surer than it is.
+/// Formats a number with at most three significant digits.
 fn figures(value: f64) -> String {
     let decimals = match value {
         _ if value >= 1e3 => return format!("{value:.2e}"),

@@ -1,4 +1,4 @@
-//! `wake dataset`: simulated images with prompts and labels, as a folder that training scripts read.
+//! `wake dataset`: simulated images with prompts and labels, as a folder for training scripts.
 
 mod arguments;
 
@@ -15,9 +15,9 @@ use wake_dataset::{
 use crate::exit::{self, Outcome};
 use crate::progress;
 
-/// Writes `images/*.png`, `labels/*.txt` (YOLO), `labels-obb/*.txt` (the same with oriented boxes), `labelTxt/*.txt` (DOTA),
-/// `metadata.jsonl`, `coco.json`, `data.yaml` with `trainset.txt` and `valset.txt`, and `dataset.json`; see docs/dataset.md.
-/// A run that was killed continues where it stopped.
+/// Writes `images/*.png`, `labels/*.txt` (YOLO), `labels-obb/*.txt` (YOLO with oriented boxes), `labelTxt/*.txt`
+/// (DOTA), `metadata.jsonl`, `coco.json`, `data.yaml` with `trainset.txt` and `valset.txt`, and `dataset.json`; see
+/// docs/dataset.md. An interrupted run continues where it stopped.
 pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     let start = Instant::now();
     let (folder, manifest, made) = if arguments.merge {
@@ -54,7 +54,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     Ok(())
 }
 
-/// Writes the card, and the shards of `WebDataset`, where they are asked for.
+/// Writes the card and the shards of `WebDataset`, if requested.
 fn for_others(folder: &Path, manifest: &Manifest, arguments: &Arguments) -> Outcome<()> {
     let license = &arguments.license;
     if arguments.card {
@@ -69,7 +69,7 @@ fn for_others(folder: &Path, manifest: &Manifest, arguments: &Arguments) -> Outc
     Ok(())
 }
 
-/// Joins the shards of a folder.
+/// Merges the shards of a folder.
 fn joined(folder: &Path) -> Outcome<Manifest> {
     merge(folder).map_err(|error| match error {
         wake_dataset::Error::Dataset { .. } => {
@@ -103,7 +103,7 @@ fn manifest(arguments: &Arguments) -> Outcome<Manifest> {
     })
 }
 
-/// The pairs of a set, on the learnt sea that is asked for.
+/// The pairs of a set, with the learnt sea if one is given.
 #[cfg(feature = "generate")]
 fn source(manifest: &Manifest, arguments: &Arguments) -> Outcome<Simulated> {
     let source = manifest.source()?;
@@ -123,10 +123,10 @@ fn source(manifest: &Manifest, _: &Arguments) -> Outcome<Simulated> {
     Ok(manifest.source()?)
 }
 
-/// Seconds of a core above which what a set costs is said first.
+/// Cost above which a note is printed first \[core seconds\].
 const LONG: f64 = 600.0;
 
-/// Says what a large set costs, by the plans of its first scenes.
+/// Prints the cost of a large set, estimated from the plans of its first scenes.
 fn tell_cost(manifest: &Manifest) -> wake_dataset::Result<()> {
     let (each, indices) = (manifest.core_seconds()?, manifest.indices());
     let total = each * (indices.end - indices.start) as f64;
@@ -139,7 +139,7 @@ fn tell_cost(manifest: &Manifest) -> wake_dataset::Result<()> {
     Ok(())
 }
 
-/// Makes what is missing under a progress bar; returns how many images that were.
+/// Makes the missing images under a progress bar; returns their number.
 fn make(
     folder: &Path,
     manifest: &Manifest,

@@ -1,4 +1,5 @@
-//! `wake detect`: searches images, draws them with their wakes, and tells them as JSON; of products as a map.
+//! `wake detect`: detects wakes in images, draws them and prints them as text or JSON; maps those of satellite
+//! products.
 
 mod arguments;
 mod product;
@@ -19,21 +20,23 @@ pub(crate) use arguments::Arguments;
 use arguments::Method;
 use sure::how_sure;
 
-/// Prints every wake by tip, axis, half-angle, visible length and score, and draws the wakes of `NAME` into `NAME.wakes.png`
-/// in `--out`. Files of a folder that cannot be read are named, and the others are searched.
+/// Prints tip, axis and length of every sure wake, and draws the wakes of `NAME` into `NAME.wakes.png` in `--out`;
+/// `--json` prints all detections. Files of a folder that cannot be read are reported, and the others are searched.
 pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     if let [path] = &arguments.images[..]
         && let Some(found) = product::opened(path, &arguments.product)?
     {
+        arguments.check(true)?;
         return product::run(&found, arguments);
     }
+    arguments.check(false)?;
     let files = image_files(&arguments.images)?;
     let finder = finder(arguments)?;
     let bar = progress::bar(files.len() as u64, "images");
     let mut told = Told::default();
     let searched = search(&files, finder.as_ref(), arguments, &mut told, &bar);
     bar.finish_and_clear();
-    // Also when the search ended early: what was found until then is told.
+    // Prints also if the search ended early: the results so far.
     if arguments.json && !told.images.is_empty() {
         let told = json!({ "images": told.images, "unread": told.unread });
         exit::say(&format!("{told:#}"))?;
@@ -50,7 +53,7 @@ fn finder(arguments: &Arguments) -> Outcome<Box<dyn Finder>> {
         Method::Radon => Ok(Box::new(Radon)),
         Method::Network => {
             let weights = arguments.weights.as_deref();
-            let detector = named::network(weights, &arguments.device, arguments.least_score)?;
+            let detector = named::network(weights, &arguments.device, arguments.least_score())?;
             Ok(Box::new(match arguments.spacing {
                 Some(metres) => detector.with_spacing(metres)?,
                 None => detector,
@@ -59,16 +62,17 @@ fn finder(arguments: &Arguments) -> Outcome<Box<dyn Finder>> {
     }
 }
 
-/// Results by the names of the images.
+/// Results by image name.
 #[derive(Default)]
 struct Told {
     /// The wakes of each image.
     images: Map<String, Value>,
-    /// Why an image was not read.
+    /// Reasons why images were not read.
     unread: Map<String, Value>,
 }
 
-/// Searches and draws all files that can be read. A single one that cannot is an error, one of several is noted.
+/// Searches and draws all files that can be read. An unreadable file is an error if it is the only one; otherwise it is
+/// noted.
 fn search(
     files: &[PathBuf],
     finder: &dyn Finder,
@@ -88,7 +92,7 @@ fn search(
                 continue;
             }
         };
-        // What cannot be read leaves no folder behind.
+        // An unreadable image leaves no folder behind.
         if told.images.is_empty() {
             make_folder(&arguments.out)?;
         }
@@ -110,7 +114,7 @@ fn draw(image: &GreyImage, found: &[Detection], arguments: &Arguments, file: &Pa
     picture::write(&drawing.into_picture(), &path)
 }
 
-/// The wakes of an image that are likely ones, a line each.
+/// The sure wakes of an image, a line each.
 fn summary(name: &str, found: &[Detection]) -> String {
     let sure: Vec<&Detection> = found.iter().filter(|one| one.sure).collect();
     let mut text = format!("{name}: {} wakes", sure.len());
@@ -128,7 +132,7 @@ fn summary(name: &str, found: &[Detection]) -> String {
     text
 }
 
-/// A detection as the program prints it.
+/// A detection as printed JSON.
 fn as_json(one: &Detection) -> Value {
     json!({
         "probability": one.probability,

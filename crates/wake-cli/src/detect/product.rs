@@ -1,4 +1,4 @@
-//! `wake detect PRODUCT`: the wakes of a satellite product as places on a map.
+//! `wake detect PRODUCT`: maps the wakes of a satellite product.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -22,7 +22,7 @@ use crate::{named, progress};
 /// Longest side of the quick-look \[pixels\].
 const LONGEST: usize = 1600;
 
-/// The product behind a path: a `.SAFE` folder, a `.zip`, or a TIFF with places or of 32-bit numbers; `None` for other images.
+/// Opens a `.SAFE` folder, a `.zip`, or a TIFF with places or of 32-bit numbers as a product; `None` for other images.
 pub(crate) fn opened(path: &Path, arguments: &ProductArguments) -> Outcome<Option<Product>> {
     let has = |name: &str| path.join(name).exists();
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
@@ -31,7 +31,7 @@ pub(crate) fn opened(path: &Path, arguments: &ProductArguments) -> Outcome<Optio
         || path.file_name().is_some_and(|name| name == "manifest.safe")
         || matches!(ending.as_deref(), Some("zip" | "safe"));
     if is_tiff && path.is_file() {
-        // Whatever the other reader takes is an image.
+        // TIFF files without places that the image reader accepts are images.
         let product = Product::open(path).ok();
         let is_map = |product: &Product| product.has_places() || GreyImage::read(path).is_err();
         return Ok(product.filter(is_map));
@@ -45,8 +45,8 @@ pub(crate) fn opened(path: &Path, arguments: &ProductArguments) -> Outcome<Optio
     }))
 }
 
-/// Searches a product; writes `wakes.geojson`, `wakes.csv`, `wakes.json`, `quicklook.png` and `report.html` into the folder. A search
-/// that was stopped goes on where it was, as `search.jsonl` has it.
+/// Searches a product; writes `wakes.geojson`, `wakes.csv`, `wakes.json`, `quicklook.png` and `report.html` into the
+/// folder. A stopped search continues from its state in `search.jsonl`.
 pub(crate) fn run(product: &Product, arguments: &Arguments) -> Outcome<()> {
     let (out, options) = (&arguments.out, &arguments.product);
     let name = product.path().file_name().unwrap_or_default();
@@ -55,7 +55,7 @@ pub(crate) fn run(product: &Product, arguments: &Arguments) -> Outcome<()> {
     let detector = named::network(
         arguments.weights.as_deref(),
         &arguments.device,
-        arguments.least_score,
+        arguments.least_score(),
     )?;
     let spacing = spacing(product, arguments.spacing)?;
     let detector = match spacing {
@@ -67,8 +67,8 @@ pub(crate) fn run(product: &Product, arguments: &Arguments) -> Outcome<()> {
     product.read_window(0..1, 0..1)?;
     make_folder(out)?;
     let settings = json!({
-        "spacing": spacing, "least_score": arguments.least_score, "weights": arguments.weights, "land": options.land,
-        "coast": options.coast,
+        "spacing": spacing, "least_score": arguments.least_score(), "weights": arguments.weights, "land": options.land,
+        "coast": options.coast(),
     });
     let state = out.join("search.jsonl");
     let bar = progress::bar(0, "tiles");
@@ -107,7 +107,7 @@ pub(crate) fn run(product: &Product, arguments: &Arguments) -> Outcome<()> {
                     w.display().to_string()
                 }),
         ),
-        ("least score", arguments.least_score.to_string()),
+        ("least score", arguments.least_score().to_string()),
         (
             "land",
             match (&options.land, options.no_land) {
@@ -115,11 +115,11 @@ pub(crate) fn run(product: &Product, arguments: &Arguments) -> Outcome<()> {
                 (Some(file), _) => format!(
                     "{}, and {} m of sea before it, left out",
                     file.display(),
-                    options.coast
+                    options.coast()
                 ),
                 (None, _) => format!(
                     "Natural Earth 1:10 million, and {} m of sea before it, left out",
-                    options.coast
+                    options.coast()
                 ),
             },
         ),
@@ -142,7 +142,7 @@ pub(crate) fn run(product: &Product, arguments: &Arguments) -> Outcome<()> {
     Ok(())
 }
 
-/// Adds speed, heading and wind to the sure wakes; a wake at land or a border, which cannot be estimated, is noted.
+/// Adds speed, heading and wind to the sure wakes; wakes at land or a border, which cannot be estimated, are noted.
 #[cfg(feature = "simulate")]
 fn estimate(product: &Product, wakes: &mut [MappedWake]) -> Outcome<()> {
     use wake_physics::estimate::{Parameter, Value};
@@ -186,7 +186,7 @@ fn watch(bar: &ProgressBar, done: usize, of: usize) {
     bar.set_position(done as u64);
 }
 
-/// Distance between pixels \[m\]: what is asked for, or what the product says.
+/// Pixel spacing \[m\]: the one given, or that of the product.
 fn spacing(product: &Product, asked: Option<f32>) -> Outcome<Option<f32>> {
     if asked.is_some() || !product.has_places() {
         return Ok(asked);
@@ -206,11 +206,11 @@ fn land(product: &Product, options: &ProductArguments) -> Outcome<Option<LandMas
         Some(file) => Land::read(file)?,
         None => Land::natural_earth(),
     };
-    let mask = land.mask(product, options.coast)?;
+    let mask = land.mask(product, options.coast())?;
     Ok(Some(mask).filter(|mask| !mask.is_empty()))
 }
 
-/// A small picture of a product, and the same with its wakes.
+/// A small picture of a product, without and with its wakes.
 struct QuickLook {
     plain: image::GrayImage,
     drawn: RgbImage,
@@ -235,7 +235,7 @@ fn quick_look(product: &Product, wakes: &[MappedWake]) -> Outcome<QuickLook> {
             });
         }
     }
-    // Half grey is the median.
+    // The median becomes mid-grey.
     let mut sorted: Vec<f64> = means.iter().copied().filter(|&m| m > 0.0).collect();
     sorted.sort_by(f64::total_cmp);
     let median = sorted.get(sorted.len() / 2).copied().unwrap_or(1.0);
@@ -253,7 +253,7 @@ fn quick_look(product: &Product, wakes: &[MappedWake]) -> Outcome<QuickLook> {
     })
 }
 
-/// A wake in pixels of which `step` of the product make one.
+/// A wake in the pixels of a quick-look reduced by `step`.
 fn scaled(wake: &MappedWake, step: usize) -> Detection {
     let small = |at: f64| ((at + 0.5) / step as f64 - 0.5) as f32;
     let (tip, end) = ([wake.pixel, wake.line].map(small), wake.end_px.map(small));
@@ -272,7 +272,7 @@ fn scaled(wake: &MappedWake, step: usize) -> Detection {
     }
 }
 
-/// The wakes that are likely ones, a line each.
+/// The sure wakes, a line each.
 fn summary(name: &str, wakes: &[MappedWake], out: &Path) -> String {
     let sure: Vec<&MappedWake> = wakes.iter().filter(|wake| wake.sure).collect();
     let mut text = format!("{name}: {} wakes", sure.len());

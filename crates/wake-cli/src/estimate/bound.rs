@@ -1,4 +1,4 @@
-//! Cramér–Rao bound of ship and wind, as text and JSON.
+//! Cramér–Rao bounds of ship and wind, as text and JSON.
 
 use super::line::line;
 use crate::exit::Outcome;
@@ -7,7 +7,7 @@ use wake_physics::Scene;
 use wake_physics::estimate::{Bound, Parameter, Priors, bound};
 
 pub(super) fn told(scene: &Scene, priors: &Priors, as_json: bool) -> Outcome<String> {
-    // Scenes without a ship tell of the wind.
+    // Without a ship, only the wind is estimated.
     let parameters: Vec<Parameter> = Parameter::OF_WAKE
         .into_iter()
         .filter(|p| !scene.ships.is_empty() || !p.is_of_ship())
@@ -19,7 +19,7 @@ pub(super) fn told(scene: &Scene, priors: &Priors, as_json: bool) -> Outcome<Str
     })
 }
 
-/// Values that are not told have null.
+/// The bounds as JSON; values that cannot be estimated are null.
 fn in_json(bound: &Bound) -> Value {
     let deviations = bound.deviations.iter();
     let deviations: Map<String, Value> = deviations

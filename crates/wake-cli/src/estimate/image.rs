@@ -1,4 +1,4 @@
-//! Ship and wind of an image, as text and JSON.
+//! Input images and results of an estimate, as text, JSON and picture.
 
 use super::line::line;
 use crate::exit::Outcome;
@@ -12,12 +12,12 @@ use wake_physics::estimate::{Estimate, Estimated, Sighting};
 use wake_physics::grey::GreyScale;
 use wake_physics::{Field, Scene};
 
-/// Errors of place \[m\] and heading \[deg\] of the sighting in the example.
+/// Errors of position \[m\] and heading \[deg\] of the sighting in the example.
 const OFF: ([f64; 2], f64) = ([40.0, -30.0], 2.0);
 
-/// Reads the pixels of a scene's grid.
+/// Reads the pixels that the grid of a scene covers.
 ///
-/// - `at`: row and column of the first in the image
+/// - `at`: row and column in the image of the grid's first pixel
 /// - `grey`: meaning of the levels of a picture
 pub(super) fn read(
     path: &Path,
@@ -65,7 +65,7 @@ fn first(
     }
 }
 
-/// A part of a field.
+/// Cuts a part out of a field.
 fn part(
     field: &Field,
     [row, column]: [usize; 2],
@@ -91,7 +91,7 @@ fn part(
     })
 }
 
-/// The image with speckle that `wake simulate` wrote.
+/// Reads the image with speckle from a file of `wake simulate`.
 fn speckled(path: &Path) -> Outcome<Field> {
     let bytes = whole_files::read_bytes(path)?;
     let refused = |why: &str| {
@@ -115,7 +115,7 @@ fn speckled(path: &Path) -> Outcome<Field> {
     })
 }
 
-/// Level of white: that of 8 or of 16 bits.
+/// Level of white in an image of 8 or 16 bits.
 fn white(path: &Path) -> Outcome<f64> {
     let colour = ImageReader::open(path)?
         .with_guessed_format()?
@@ -130,7 +130,7 @@ fn white(path: &Path) -> Outcome<f64> {
     })
 }
 
-/// A sighting with a wrong place and heading.
+/// Adds errors of position and heading to a sighting.
 pub(super) fn mistaken(sighting: &Sighting) -> Sighting {
     let ([x, y], turn) = OFF;
     Sighting {
@@ -164,7 +164,7 @@ pub(super) fn draw(path: &Path, image: &Field, found: &Estimate) -> Outcome<()> 
     Ok(Picture::sheet(&panels, panels.len()).write(path)?)
 }
 
-/// Estimate as JSON or text, with the prompt of its scene.
+/// Estimate as JSON or text, with the prompt of the estimated scene.
 pub(super) fn told(found: &Estimate, as_json: bool) -> Outcome<String> {
     #[cfg(feature = "prompt")]
     let sentence = Some(wake_text::prompt(&found.scene)?);
@@ -272,7 +272,7 @@ mod tests {
     use wake_physics::grey::Mapping;
     use wake_physics::output::{write_fields, write_png};
 
-    /// A window of fields and of a picture; what is no such file names what is.
+    /// Windows are read from fields and pictures; files of another kind cause an error that names the right kind.
     #[test]
     fn windows_are_those_of_the_file() {
         let folder = tempfile::tempdir().unwrap();
@@ -297,7 +297,7 @@ mod tests {
         for (name, grey) in [("a.safetensors", None), ("a.png", Some(&grey))] {
             let found = read(&at(name), Some([1, 2]), grey, &scene).unwrap();
             let pairs = found.values.iter().zip(&expected);
-            // Grey of 8 bits has the values of its levels.
+            // 8-bit grey reproduces the values of its levels.
             assert!(
                 pairs.clone().all(|(a, b)| (a / b - 1.0).abs() < 1e-5),
                 "{name}"

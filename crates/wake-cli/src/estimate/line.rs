@@ -1,4 +1,4 @@
-//! A line of text for one value.
+//! Line of text for one value.
 
 use wake_physics::estimate::Parameter;
 

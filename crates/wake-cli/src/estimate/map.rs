@@ -1,4 +1,4 @@
-//! The bound of a ship's speed by wind and heading, for several sensors, as one picture.
+//! Map of the speed bound over wind and heading, for several sensors.
 
 use crate::exit::Outcome;
 use plotters::prelude::*;
@@ -7,7 +7,7 @@ use std::path::Path;
 use wake_physics::Scene;
 use wake_physics::estimate::{Parameter, Priors, Value, bound};
 
-/// The sensors, the spacing of their pixels \[m\] and the pixels along a side.
+/// Sensors with their pixel spacing \[m\] and pixels along a side.
 const SENSORS: [(&str, f64, usize); 7] = [
     ("sentinel-1-iw", 10.0, 104),
     ("radarsat-2-s", 12.5, 84),
@@ -18,17 +18,17 @@ const SENSORS: [(&str, f64, usize); 7] = [
     ("novasar-1", 8.0, 130),
 ];
 
-/// Winds [m/s] and headings \[deg\] of the cells: a ship that goes the other way in range is seen as well.
+/// Winds [m/s] and headings \[deg\] of the cells; headings in the other range direction are symmetric.
 const WINDS: [f64; 5] = [3.0, 5.0, 7.0, 9.0, 11.0];
 const HEADINGS: [f64; 5] = [0.0, 45.0, 90.0, 135.0, 180.0];
 
-/// Deviations of the speed at which the colours begin and end [m/s].
+/// Standard deviations of the speed at the ends of the colour scale [m/s].
 const COLOURS: [f64; 2] = [0.003, 3.0];
 
-/// Width and height of a panel.
+/// Width and height of a panel \[pixels\].
 const PANEL: (u32, u32) = (250, 230);
 
-/// Draws a panel a sensor; all else is as in the scene.
+/// Draws one panel per sensor; everything else is as in the scene.
 pub(super) fn draw(path: &Path, scene: &Scene, priors: &Priors) -> Outcome<()> {
     let cells: Vec<(usize, f64, f64)> = (0..SENSORS.len())
         .flat_map(|n| WINDS.into_iter().map(move |wind| (n, wind)))
@@ -44,7 +44,7 @@ pub(super) fn draw(path: &Path, scene: &Scene, priors: &Priors) -> Outcome<()> {
     picture(path, &bounds?)
 }
 
-/// The scene by a sensor, the ship in the middle of the upper half of its wake's square.
+/// The scene with a sensor, wind and heading; the ship lies 300 m from the middle, ahead of its wake.
 fn seen(
     scene: &Scene,
     (sensor, spacing, side): (&str, f64, usize),
@@ -66,7 +66,7 @@ fn seen(
     Ok(scene.clone().with_assignments(&keys)?)
 }
 
-/// - `bounds` [m/s] of sensors, winds and headings, the last running fastest
+/// - `bounds`: [m/s] by sensor, wind and heading, the last running fastest
 fn picture(path: &Path, bounds: &[f64]) -> Outcome<()> {
     let size = (4 * PANEL.0, 2 * PANEL.1);
     let area = SVGBackend::new(path, size).into_drawing_area();
@@ -142,7 +142,7 @@ fn number(bound: f64) -> String {
     }
 }
 
-/// Share of the way from the best bound to the worst, in logarithms.
+/// Position of a bound on the colour scale, 0 to 1, logarithmic.
 fn share(bound: f64) -> f64 {
     let [low, high] = COLOURS;
     ((bound / low).ln() / (high / low).ln()).clamp(0.0, 1.0)
@@ -165,7 +165,7 @@ fn colour(bound: f64) -> RGBColor {
     RGBColor(r, g, b)
 }
 
-/// White on dark cells, black on bright ones.
+/// Text colour: white on dark cells, black on bright ones.
 fn ink(bound: f64) -> RGBColor {
     if share(bound) < 0.55 { WHITE } else { BLACK }
 }
@@ -192,7 +192,7 @@ mod tests {
         }
     }
 
-    /// Scenes of all cells are valid.
+    /// The scenes of all cells are valid.
     #[test]
     fn sensors_see_the_scene() {
         for sensor in SENSORS {

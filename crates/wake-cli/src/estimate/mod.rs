@@ -1,4 +1,5 @@
-//! `wake estimate`: ship and wind of an image with error bars, and how well an image can tell them.
+//! `wake estimate`: estimates ship and wind from an image with error bars, and computes how well an image can determine
+//! them.
 
 mod bound;
 mod image;
@@ -15,41 +16,45 @@ use wake_physics::{Scene, simulate};
 
 /// Estimate ship and wind from an image of a wake, with error bars.
 ///
-/// With --image, searches for the ship within some 150 m and 7 degrees of place and heading in --scene, at any speed from 3.5 to 17 m/s, and maximises the
-/// likelihood. With --bound, prints the smallest standard deviations of any unbiased estimate (Cramér–Rao); it needs no image. Without either, simulates the scene and
-/// estimates it from a place and a heading that are wrong.
+/// With --image, searches for the ship within some 150 m and 7 degrees of place and heading in --scene, at any speed
+/// from 3.5 to 17 m/s, by maximum likelihood. With --bound, prints the smallest standard deviations of any unbiased
+/// estimate (Cramér–Rao bound) and needs no image. Without either, simulates the scene and estimates it, starting from
+/// a wrong place and heading.
 #[derive(Args)]
 #[command(
     after_help = "Scene keys with their units, ranges and defaults: docs/scene_keys.md\n\
                         Meaning and limits: docs/estimate.md"
 )]
 pub(crate) struct Arguments {
-    /// Image of σ⁰ with speckle: fields.safetensors of `wake simulate`, TIFF of floats, grey PNG or TIFF with --grey, or a Sentinel-1 product with --at
+    /// Image of σ⁰ with speckle: fields.safetensors of `wake simulate`, TIFF of floats, grey PNG or TIFF with --grey,
+    /// or a Sentinel-1 product with --at
     #[arg(long, value_name = "FILE", conflicts_with = "bound")]
     image: Option<PathBuf>,
-    /// First row and column of the scene's grid in the image
+    /// Row and column in the image of the first pixel of the scene's grid
     #[arg(long, value_name = "ROW,COLUMN", value_parser = row_and_column, requires = "image")]
     at: Option<[usize; 2]>,
-    /// Levels of the image are linear in amplitude from black to white, the decibels of σ⁰ given here; with a third word `decibel` linear in decibels
+    /// σ⁰ of black and white in an image of grey levels (dB), such as -25,-3; levels are linear in amplitude, or linear
+    /// in decibels with a third word `decibel`
     #[arg(long, value_name = "BLACK,WHITE", value_parser = grey, requires = "image", allow_hyphen_values = true)]
     grey: Option<GreyScale>,
-    /// Write a PNG of the image, the mean image of the estimate, and their ratio
+    /// Write the image, the mean image of the estimate and their ratio as a PNG
     #[arg(long, value_name = "FILE", conflicts_with = "bound")]
     picture: Option<PathBuf>,
-    /// Print the Cramér–Rao bound of ship and wind for an image of the scene
+    /// Print the Cramér–Rao bounds of ship and wind for an image of the scene
     #[arg(long)]
     bound: bool,
-    /// Draw the bound of the speed by wind and heading for seven sensors as SVG, some 10 minutes on two cores
+    /// Draw the speed bound by wind and heading for seven sensors as an SVG (some 10 minutes on two cores)
     #[cfg(feature = "train")]
     #[arg(long, value_name = "FILE", requires = "bound", conflicts_with = "json")]
     map: Option<PathBuf>,
-    /// Scene file (TOML) of the known values with place and heading of the ship; without it the default scene on 256 x 256 pixels of 4 m
+    /// Scene file (TOML) with the known values, and place and heading of the ship [default: the default scene on 256 x
+    /// 256 pixels of 4 m]
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
-    /// Change one value of the scene, such as radar.incidence=35; may be repeated
+    /// Set one value of the scene, such as radar.incidence=35; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// The brightness of the image is unknown: contrasts alone count
+    /// Treat the brightness of the image as unknown and use only contrasts
     #[arg(long)]
     uncalibrated: bool,
     /// Print the result as JSON on standard output, and nothing else
@@ -100,7 +105,7 @@ fn example() -> Scene {
     scene
 }
 
-/// Two levels in decibels, and perhaps the mapping between them.
+/// Parses two levels in decibels, and optionally the mapping between them.
 fn grey(text: &str) -> Result<GreyScale, String> {
     let parts: Vec<&str> = text.split(',').map(str::trim).collect();
     let mapping = match parts.get(2) {
@@ -122,7 +127,7 @@ fn grey(text: &str) -> Result<GreyScale, String> {
     Ok(grey)
 }
 
-/// Two numbers with a comma between them.
+/// Parses two numbers separated by a comma.
 fn row_and_column(text: &str) -> Result<[usize; 2], String> {
     let pair = text.split_once(',');
     let numbers = pair.map(|(row, column)| (row.trim().parse(), column.trim().parse()));

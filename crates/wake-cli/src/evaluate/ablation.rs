@@ -1,14 +1,15 @@
-//! One scene as every kind of image draws it.
+//! Picture of one scene by every kind of image.
 
 use crate::exit::Outcome;
 use crate::sheet::Picture;
 use wake_physics::{Field, Scene};
 use wake_train::evaluation::{Baseline, Evaluation, ImageSource, Told};
 
-/// Panels of the picture in a row.
+/// Panels in a row.
 const ACROSS: usize = 3;
 
-/// One scene as every kind of image draws it, in one stretch of grey: three standard deviations of the simulator's image to each side of its mean.
+/// One scene by every kind of image, all on the same grey scale: three standard deviations of the simulator's image on
+/// each side of its mean.
 pub(crate) fn picture(scene: &Scene, judged: &Evaluation<'_>) -> Outcome<Picture> {
     let draw = |source: &dyn ImageSource| -> Outcome<Field> {
         let view = &judged.view;

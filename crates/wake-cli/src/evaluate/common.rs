@@ -1,4 +1,4 @@
-//! Options of every evaluation of images.
+//! Options shared by evaluations of images.
 
 use crate::exit::Outcome;
 use clap::Args;
@@ -6,22 +6,22 @@ use std::path::PathBuf;
 use wake_nn::burn::tensor::Device;
 use wake_train::metrics::{Lpips, LpipsNetwork};
 
-/// Options of every evaluation of images.
+/// Options shared by evaluations of images.
 #[derive(Args)]
 pub(crate) struct Common {
-    /// Held-out scenes
+    /// Number of held-out scenes
     #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..=65536))]
     pub(crate) count: u32,
-    /// Weights of torchvision's alexnet as safetensors, for LPIPS; without them LPIPS is left out
+    /// Weights of torchvision's alexnet (safetensors), for LPIPS [default: no LPIPS]
     #[arg(long, value_name = "FILE", requires = "lpips_linear")]
     lpips_backbone: Option<PathBuf>,
-    /// Linear weights of the package lpips as safetensors
+    /// Linear weights of the package lpips (safetensors)
     #[arg(long, value_name = "FILE", requires = "lpips_backbone")]
     lpips_linear: Option<PathBuf>,
-    /// flex, ndarray, wgpu or cuda, where compiled in; a GPU's number may follow, as in cuda:1
+    /// Device: flex, ndarray, wgpu or cuda, if compiled in; a GPU's number may follow, as in cuda:1
     #[arg(long, default_value = "flex")]
     pub(crate) device: String,
-    /// Folder of the results, made if absent
+    /// Folder for the results, created if absent
     #[arg(long, value_name = "DIR", default_value = "out/evaluate")]
     pub(crate) out: PathBuf,
     /// Print the report as JSON on standard output, and nothing else
@@ -30,7 +30,7 @@ pub(crate) struct Common {
 }
 
 impl Common {
-    /// The networks of LPIPS, where they are named.
+    /// Loads the networks of LPIPS, if they are given.
     pub(crate) fn lpips(&self, device: &Device) -> Outcome<Option<Lpips>> {
         let (Some(backbone), Some(linear)) = (&self.lpips_backbone, &self.lpips_linear) else {
             return Ok(None);

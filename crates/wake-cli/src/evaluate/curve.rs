@@ -1,4 +1,4 @@
-//! One line of a curve: figures of a model against the number of images that it has seen in training.
+//! Learning curve: figures of a model against the number of training images.
 
 use super::report::Report;
 use crate::exit::Outcome;
@@ -7,21 +7,21 @@ use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::Path;
 
-/// Figures after some training.
+/// One point of the curve.
 #[derive(Debug, Serialize)]
 struct Point {
-    /// Images seen in training, counted again when seen again.
+    /// Images seen in training, counting repetitions.
     samples: u64,
-    /// Held-out scenes of the figures.
+    /// Held-out scenes that were evaluated.
     scenes: usize,
-    /// Share of patches that a classifier tells from simulated ones.
+    /// Accuracy of a classifier between patches of the model and simulated ones.
     two_sample: Option<f64>,
     /// Largest difference of the radial spectrum up to half the Nyquist frequency [dB].
     spectrum_db: Option<f64>,
-    /// Contrast of the wake over that of the expected image, and the simulator's own.
+    /// Contrast of the wake relative to the expected image, for the model and for the simulator.
     wake_contrast: Option<f64>,
     wake_contrast_simulator: Option<f64>,
-    /// Median absolute errors, and the share of scenes in which the value is measurable.
+    /// Median absolute error, and share of scenes in which the value is measurable.
     heading_deg: [Option<f64>; 2],
     speed_m_s: [Option<f64>; 2],
 }

@@ -1,4 +1,5 @@
-//! How like simulated images those of the model are over all scenes of a recipe, before speckle and with it.
+//! `wake evaluate domain`: compares the model's images with simulated ones over all scenes of a recipe, before speckle
+//! and with it.
 
 use std::path::PathBuf;
 
@@ -13,7 +14,7 @@ use super::model;
 use crate::exit::{self, Outcome};
 use crate::progress;
 
-/// Seed of the scenes: no training set has it.
+/// Seed of the scenes, which no training set has.
 const SEED: u64 = 1 << 40;
 
 /// Compare the model with the simulator over all scenes of a recipe.
@@ -22,19 +23,19 @@ pub(crate) struct Options {
     /// Recipe of the scenes: paper, ranges, satellites, detector, model, or a file
     #[arg(long, default_value = "satellites")]
     recipe: String,
-    /// Folder of a small model that `wake train` wrote; without it, the model in the crate
+    /// Folder of a small model of `wake train` [default: the shipped model]
     #[arg(long, value_name = "DIR")]
     weights: Option<PathBuf>,
-    /// Sampling steps; without it, the sampler's default
+    /// Sampling steps [default: the model's own]
     #[arg(long)]
     steps: Option<usize>,
-    /// Scenes; fewer than four have no two-sample test
+    /// Number of scenes; the two-sample test needs at least four
     #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..=65536))]
     count: u32,
-    /// flex, ndarray, wgpu or cuda, where compiled in
+    /// Device: flex, ndarray, wgpu or cuda, if compiled in
     #[arg(long, default_value = "flex")]
     device: String,
-    /// Folder of the results, made if absent
+    /// Folder for the results, created if absent
     #[arg(long, value_name = "DIR", default_value = "out/evaluate_domain")]
     out: PathBuf,
     /// Print the report as JSON on standard output, and nothing else
@@ -61,7 +62,7 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
         baseline(&Baseline::OtherSea),
     ];
     let bar = progress::bar(((kinds.len() + 1) * scenes.len()) as u64, "images");
-    // A third sea, so that none is that of another kind.
+    // A third random sea, which no other kind has.
     let third: Vec<Scene> = scenes.iter().map(|scene| other_sea(scene, 2)).collect();
     let simulated = Views::draw(&Baseline::Simulator, &third, |n| bar.inc(n))?;
     let (mut rows, mut pictures) = (Vec::new(), None);

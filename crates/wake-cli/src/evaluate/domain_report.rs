@@ -1,4 +1,4 @@
-//! The report over a recipe: text, and a sheet of images.
+//! Report of `wake evaluate domain`: text, and a sheet of images.
 
 use crate::sheet::Picture;
 use serde::Serialize;
@@ -6,12 +6,12 @@ use wake_physics::measure::median;
 use wake_train::TwoSample;
 use wake_train::evaluation::{DomainRow, Views};
 
-/// Scenes that are shown, each simulated and drawn by the model.
+/// Scenes on the sheet, each simulated and drawn by the model.
 const PICTURED: usize = 6;
-/// Grey of the sheet beyond the median of each scene to both sides.
+/// Half width of the sheet's grey range, around the median of each scene.
 const REACH: f32 = 0.2;
 
-/// Everything that `domain.json` holds.
+/// Contents of `domain.json`.
 #[derive(Debug, Serialize)]
 pub(crate) struct Report {
     pub(crate) recipe: String,
@@ -40,7 +40,7 @@ pub(crate) fn markdown(report: &Report) -> String {
     text
 }
 
-/// Two rows a kind: before speckle and with it; the simulator's above the model's.
+/// Sheet with two rows per kind, before speckle and with it; the simulator above the model.
 pub(crate) fn sheet(simulated: &Views, model: &Views) -> Picture {
     let mut panels = Vec::new();
     for (name, views) in [("simulator", simulated), ("model", model)] {

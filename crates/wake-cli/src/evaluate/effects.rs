@@ -1,17 +1,17 @@
-//! Effects of single values of a scene on its image: three values of heading, wind speed and incidence each, simulated and
-//! drawn by a model.
+//! Effects of single values of a scene on its image: three values each of heading, wind speed and incidence, simulated
+//! and drawn by a model.
 
 use crate::exit::Outcome;
 use crate::sheet::Picture;
 use wake_physics::{Field, Scene};
 use wake_train::evaluation::{Baseline, Evaluation, ImageSource, Told};
 
-/// Values of the paper's grid; which of them its own figure shows is not known here.
+/// Values of the paper's grid; it is not known which of them the paper's own figure shows.
 const HEADINGS: [f64; 3] = [0.0, 45.0, 90.0];
 const WINDS: [f64; 3] = [3.0, 5.0, 7.0];
 const INCIDENCES: [f64; 3] = [16.0, 24.0, 32.0];
 
-/// A row for each of three values: simulated images on the left, those of a model on the right.
+/// One row per quantity with three values: simulated images on the left, the model's on the right.
 pub(super) fn picture(evaluation: &Evaluation<'_>) -> Outcome<Picture> {
     let mut panels = Vec::new();
     for (name, unit, scenes) in rows(&evaluation.held_out.base) {
@@ -30,7 +30,7 @@ pub(super) fn picture(evaluation: &Evaluation<'_>) -> Outcome<Picture> {
     Ok(Picture::sheet(&panels, 6))
 }
 
-/// Grey as it is: brightness carries wind and incidence.
+/// Grey without contrast stretch, because brightness carries wind and incidence.
 fn panel(grey: &Field) -> Picture {
     let levels: Vec<u8> = grey
         .values
@@ -42,7 +42,7 @@ fn panel(grey: &Field) -> Picture {
 
 type Row = (&'static str, &'static str, [(f64, Scene); 3]);
 
-/// Scenes of one seed that differ in one value.
+/// Scenes with the same seed that differ in one value.
 fn rows(base: &Scene) -> [Row; 3] {
     let of = |values: [f64; 3], set: fn(&mut Scene, f64)| {
         values.map(|value| {

@@ -1,4 +1,4 @@
-//! Evaluated images, and their report.
+//! Runs an evaluation and makes its report.
 
 use super::report::{PAPER, Report};
 use super::{ablation, plot, timing};
@@ -10,20 +10,20 @@ use wake_nn::burn::tensor::Device;
 use wake_train::evaluation::{Evaluation, TextToImage};
 use wake_train::metrics::Lpips;
 
-/// The held-out scene that every kind of image shows.
+/// Held-out scene of the picture of all kinds of images.
 const PICTURED: u64 = 2;
 
-/// Models, and what is measured of them.
+/// An evaluation, and the models that it times.
 pub(super) struct Judged<'a> {
     pub(super) evaluation: Evaluation<'a>,
-    /// Models whose seconds are measured.
+    /// Models that are timed.
     pub(super) wake_model: Option<&'a WakeSampler>,
     pub(super) text_to_image: Option<&'a TextToImage<'a>>,
     pub(super) lpips: Option<&'a Lpips>,
 }
 
 impl Judged<'_> {
-    /// Draws and measures everything, with the pictures of it in a folder.
+    /// Draws and measures everything, and writes the plots into a folder.
     pub(super) fn report(&self, device: &Device, out: &Path) -> Outcome<Report> {
         whole_files::make_folder(out)?;
         let evaluation = &self.evaluation;

@@ -1,4 +1,4 @@
-//! `wake evaluate`: every figure beside the simulator's own, on scenes that no training set holds.
+//! `wake evaluate`: compares every figure with the simulator's own, on scenes that no training set has.
 
 mod ablation;
 mod calibration;
@@ -41,8 +41,8 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     }
 }
 
-/// Writes `report.json`, `report.md`, `ablation.png`, `spectrum.svg` and `wake_correlation.svg`; `docs/reports/evaluation.md` says what
-/// each figure means.
+/// Writes `report.json`, `report.md`, `ablation.png`, `spectrum.svg` and `wake_correlation.svg`;
+/// `docs/reports/evaluation.md` explains the figures.
 fn models(arguments: &Arguments) -> Outcome<()> {
     let common = &arguments.common;
     let device = device_named(&common.device)?;

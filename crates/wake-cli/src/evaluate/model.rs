@@ -5,7 +5,7 @@ use std::path::Path;
 use wake_ldm::WakeSampler;
 use wake_nn::burn::tensor::Device;
 
-/// The model of a folder, or the one in the crate; with its own number of steps, unless another is asked for.
+/// Loads the model of a folder, or the one in the crate; `steps` overrides its own number of steps.
 pub(crate) fn load(
     folder: Option<&Path>,
     steps: Option<usize>,

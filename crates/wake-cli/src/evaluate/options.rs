@@ -1,4 +1,4 @@
-//! The command line, and what it names.
+//! Arguments of `wake evaluate`.
 
 use super::common::Common;
 use super::{calibration, detector, domain, estimate, pipeline, sea};
@@ -11,13 +11,13 @@ use std::path::PathBuf;
 pub(crate) struct Arguments {
     #[command(subcommand)]
     pub(crate) task: Option<Task>,
-    /// Evaluate the simulator itself, with another random sea, instead of a model: the score of a perfect model
+    /// Evaluate the simulator with another random sea instead of a model: the score of a perfect model
     #[arg(long)]
     pub(crate) simulator_only: bool,
-    /// Folder of a small model that `wake train` wrote; without it, the model in the crate
+    /// Folder of a small model of `wake train` [default: the shipped model]
     #[arg(long, value_name = "DIR", conflicts_with = "simulator_only")]
     pub(crate) weights: Option<PathBuf>,
-    /// Sampling steps; without it, the sampler's default
+    /// Sampling steps [default: the model's own]
     #[arg(long, conflicts_with = "simulator_only")]
     pub(crate) steps: Option<usize>,
     #[command(flatten)]

@@ -1,4 +1,4 @@
-//! `wake evaluate pipeline`: any model in the layout of diffusers, at its own size.
+//! `wake evaluate pipeline`: evaluates a model in diffusers layout, at its own image size.
 
 use std::path::{Path, PathBuf};
 
@@ -21,44 +21,45 @@ use super::{curve, effects, plot, schedulers};
 use crate::exit::Outcome;
 use crate::generate::scheduler_of;
 
-/// Side of an image of the paper's recipe [m].
+/// Side length of an image of the paper's recipe [m].
 const EXTENT: f64 = 1280.0;
 
 /// Evaluate a text-to-image model in diffusers layout, at the size of its images.
 ///
-/// Scenes, pixels, grey and speckle are those of the model's data set. Writes what `wake evaluate` writes, and `effects.png`
-/// (single values of a scene changed) and `radial.svg` (radial spectra in three bands). The row `its autoencoder alone` encodes and
-/// decodes the simulated images themselves: the best that the model can do.
+/// Uses the scenes, pixels, grey and speckle of the model's data set. Writes the files of `wake evaluate`, and
+/// `effects.png` (single values of a scene changed) and `radial.svg` (radial spectra in three bands). The row `its
+/// autoencoder alone` encodes and decodes the simulated images themselves, the best result that the model can reach.
 #[derive(Args)]
 pub(crate) struct Options {
-    /// Folder of the model in diffusers layout, such as one that `wake train` wrote
+    /// Folder of a model in diffusers layout, such as one of `wake train`
     #[arg(long, value_name = "DIR")]
     weights: PathBuf,
-    /// Low-rank adaptation to merge into the model
+    /// Low-rank adaptation (LoRA) to merge into the model
     #[arg(long, value_name = "FILE")]
     lora: Option<PathBuf>,
-    /// Data set that the model was trained on [default: that of `wake train`, or the paper's scenes at 1,280 m a side with speckle]
+    /// Data set of the training [default: the one noted by `wake train`, else the paper's scenes with sides of 1,280 m
+    /// and speckle]
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Whether the model draws speckle [default: as the data set has it]
+    /// Whether the model draws speckle [default: as in the data set]
     #[arg(long)]
     speckle: Option<bool>,
-    /// Schedulers, with commas between; the first draws all images [default: the model's own]
+    /// Schedulers, separated by commas; the first draws all images [default: the model's own]
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     scheduler: Vec<String>,
-    /// Steps of each scheduler, with commas between; the first draws all images
+    /// Steps of each scheduler, separated by commas; the first number draws all images
     #[arg(long, value_delimiter = ',', default_value = "50", value_parser = clap::value_parser!(u32).range(1..=1000))]
     steps: Vec<u32>,
-    /// Steps of DDIM whose images are the reference of every scheduler's error [default: none]
+    /// DDIM steps of the reference images for the error of each scheduler [default: no reference]
     #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(u32).range(1..=1000))]
     reference: Option<u32>,
-    /// Guidance scale; 1 or less: no guidance
+    /// Guidance scale; 1 or less disables guidance
     #[arg(long, default_value_t = 1.0)]
     guidance: f64,
     /// Append the figures to this file of JSON lines
     #[arg(long, value_name = "FILE", requires = "samples")]
     curve: Option<PathBuf>,
-    /// Number of training images, for --curve
+    /// Number of training images seen, for --curve
     #[arg(long, requires = "curve")]
     samples: Option<u64>,
     #[command(flatten)]
@@ -120,14 +121,14 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
     report.write(common)
 }
 
-/// The wake model, where it draws such scenes; it knows no speckle of its own.
+/// The wake model, if it can draw such scenes; its images have no speckle of their own.
 fn wake_model(held_out: &HeldOut, view: &View, device: &Device) -> Outcome<Option<WakeSampler>> {
     let model = WakeSampler::pretrained(device)?;
     let fits = model.check_scene(&held_out.scene(0)).is_ok() && view.grey == GreyScale::default();
     Ok(fits.then_some(model))
 }
 
-/// The recipe that `wake train` noted beside a model.
+/// The recipe that `wake train` recorded beside a model.
 fn learnt_from(weights: &Path) -> Outcome<Option<Recipe>> {
     let path = weights.join("run.json");
     if !path.is_file() {
@@ -140,7 +141,7 @@ fn learnt_from(weights: &Path) -> Outcome<Option<Recipe>> {
 }
 
 impl Options {
-    /// Held-out scenes of the model's size, and how its images are looked at.
+    /// Held-out scenes of the model's size, and the view (grey and speckle) of its images.
     fn scenes(&self, pipeline: &Pipeline) -> Outcome<(HeldOut, View)> {
         let [rows, columns] = pipeline.image_size();
         let recipe = match (&self.data, learnt_from(&self.weights)?) {
@@ -172,7 +173,7 @@ impl Options {
         Ok((held_out, view))
     }
 
-    /// All schedulers with all steps.
+    /// All combinations of schedulers and steps.
     fn ways<'a>(&self, pipeline: &'a Pipeline, view: &View) -> Outcome<Vec<Drawn<'a>>> {
         let own = vec![None];
         let named = self.scheduler.iter().map(|name| Some(name.as_str()));

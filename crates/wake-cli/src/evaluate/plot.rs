@@ -1,4 +1,4 @@
-//! The plots: radial spectra against the simulator's, and wake correlation scene by scene.
+//! Plots of radial spectra relative to the simulator's, and of wake correlation by scene.
 
 use super::report::Report;
 use crate::exit::Outcome;
@@ -11,7 +11,7 @@ const COLOURS: [RGBColor; 3] = [
     RGBColor(214, 39, 40),
 ];
 
-/// Power of each ring less that of the reference [dB].
+/// Plots the power of each ring relative to the reference [dB].
 pub(crate) fn spectrum(path: &Path, report: &Report) -> Outcome<()> {
     let area = SVGBackend::new(path, (900, 560)).into_drawing_area();
     area.fill(&WHITE)?;
@@ -27,7 +27,7 @@ pub(crate) fn spectrum(path: &Path, report: &Report) -> Outcome<()> {
         .x_desc("periods in the image")
         .y_desc("dB")
         .draw()?;
-    // A constant image has no spectrum to show.
+    // A constant image has no spectrum.
     let shown = report
         .figures
         .pixels
@@ -46,7 +46,7 @@ pub(crate) fn spectrum(path: &Path, report: &Report) -> Outcome<()> {
     Ok(())
 }
 
-/// Power of each ring of the model's images and of simulated ones [dB], with the borders of three bands.
+/// Plots the power of each ring for the model's and simulated images [dB], with the borders of three bands.
 pub(crate) fn radial(path: &Path, report: &Report) -> Outcome<()> {
     let area = SVGBackend::new(path, (900, 560)).into_drawing_area();
     area.fill(&WHITE)?;
@@ -90,7 +90,7 @@ pub(crate) fn radial(path: &Path, report: &Report) -> Outcome<()> {
     Ok(())
 }
 
-/// Wake correlation of model and simulator, a dot a scene.
+/// Plots the wake correlation of model against simulator, a dot per scene.
 pub(crate) fn wake(path: &Path, report: &Report) -> Outcome<()> {
     let area = SVGBackend::new(path, (620, 600)).into_drawing_area();
     area.fill(&WHITE)?;

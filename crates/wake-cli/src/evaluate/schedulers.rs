@@ -1,4 +1,4 @@
-//! Schedulers and their steps: figures, seconds, and the error against many steps.
+//! Schedulers and steps: image figures, seconds, and the error against a reference of many steps.
 
 use crate::exit::Outcome;
 use serde::Serialize;
@@ -7,31 +7,32 @@ use wake_physics::{Field, Scene};
 use wake_train::evaluation::{Baseline, Evaluation, ImageSource, PixelRow, TextToImage, Told};
 use wake_train::metrics::Lpips;
 
-/// A scheduler's name, and the model with it.
+/// A model with a named scheduler.
 pub(super) struct Drawn<'a> {
     pub(super) scheduler: String,
     pub(super) source: TextToImage<'a>,
 }
 
-/// Scenes that every scheduler draws, as many as there are up to this number.
+/// Most scenes that every scheduler draws.
 const SCENES: usize = 16;
 
-/// A scheduler with a number of steps.
+/// Figures of a scheduler with a number of steps.
 #[derive(Debug, Serialize)]
 pub(crate) struct SchedulerRow {
     pub(crate) scheduler: String,
     pub(crate) steps: usize,
-    /// Seconds an image.
+    /// Seconds per image.
     pub(crate) seconds: f64,
-    /// Root mean square difference of grey from the reference of the same noise, over the reference's standard deviation.
+    /// Root mean square difference of grey from the reference with the same noise, over the reference's standard
+    /// deviation.
     pub(crate) error: Option<f64>,
-    /// Against simulated images.
+    /// Comparison with simulated images.
     pub(crate) pixels: PixelRow,
 }
 
-/// A row for each way to draw.
+/// Figures of each scheduler and number of steps.
 ///
-/// - `reference`: DDIM with many steps, whose images the others should have
+/// - `reference`: DDIM with many steps, from which errors are measured
 pub(super) fn rows(
     ways: &[Drawn<'_>],
     reference: Option<&Drawn<'_>>,

@@ -1,4 +1,4 @@
-//! Similarity of simulated, learnt and Gaussian seas to the sea of real images.
+//! `wake evaluate sea`: similarity of simulated, learnt and Gaussian seas to the sea of real images.
 
 use std::path::{Path, PathBuf};
 
@@ -18,9 +18,9 @@ use crate::exit::{self, Outcome};
 use crate::progress;
 use crate::sea_images::{Half, list};
 
-/// First seed of what is drawn: no training has it.
+/// First seed of the simulated seas, which no training has.
 const SEED: u64 = 1 << 40;
-/// Styles that are shown.
+/// Number of styles in the picture.
 const SHOWN: usize = 4;
 
 /// Compare simulated seas, and one learnt from real images, with the right halves of these images.
@@ -29,19 +29,19 @@ pub(crate) struct Options {
     /// Folder of real images; pixels marked in `NAME_mask.png` are left out
     #[arg(long, value_name = "DIR")]
     real: PathBuf,
-    /// Learnt sea of `wake train sea --half left` on these images
+    /// Learnt sea from `wake train sea --half left` on these images
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
-    /// Recipes whose open seas are compared: satellites, detector or a TOML file
+    /// Recipes whose open seas are compared: satellites, detector or a TOML file; may be repeated
     #[arg(long, value_name = "NAME", default_values = ["satellites", "detector"])]
     recipe: Vec<String>,
     /// Most windows of open sea per half image
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u8).range(1..))]
     windows: u8,
-    /// flex, ndarray, wgpu or cuda, where compiled in
+    /// Device: flex, ndarray, wgpu or cuda, if compiled in
     #[arg(long, default_value = "flex")]
     device: String,
-    /// Folder of the results, made if absent
+    /// Folder for the results, created if absent
     #[arg(long, value_name = "DIR", default_value = "out/evaluate_sea")]
     out: PathBuf,
     /// Print the report as JSON on standard output, and nothing else
@@ -77,7 +77,7 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
         )
         .into());
     }
-    // What cannot be read leaves no folder behind.
+    // Unreadable images leave no folder behind.
     whole_files::make_folder(&options.out)?;
     let right =
         |pairs: &[SeaPair]| -> Vec<Field> { pairs.iter().map(|p| p.right.clone()).collect() };
@@ -124,9 +124,9 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
     Ok(())
 }
 
-/// The kinds of sea beside a learnt one.
+/// Figures of a learnt sea and of the other kinds of sea.
 ///
-/// - `told`: accuracy of a classifier of the windows and of the right halves
+/// - `told`: accuracy of a classifier between some windows and the right halves
 fn beside_learnt(
     pairs: &[SeaPair],
     right: &[Field],
@@ -146,7 +146,7 @@ fn beside_learnt(
     Ok(rows)
 }
 
-/// Seas of the first styles: Gaussian noise above, below it what the flow makes of the same noise.
+/// Picture of seas of several styles: Gaussian noise above, the flow's output for the same noise below.
 fn picture(learnt: &SeaTexture, path: &Path) -> Outcome<()> {
     let step = learnt.styles().len() / SHOWN;
     let show = |field: &Field, caption: &str| {

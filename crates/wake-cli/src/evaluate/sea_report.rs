@@ -1,10 +1,10 @@
-//! The report of seas as text.
+//! Report of `wake evaluate sea` in Markdown.
 
 use serde::Serialize;
 use wake_train::TwoSample;
 use wake_train::evaluation::sea::{GroupAccuracy, SeaRow};
 
-/// Everything that `report.json` holds.
+/// Contents of `report.json`.
 #[derive(Debug, Serialize)]
 pub(crate) struct SeaReport {
     pub(crate) images: usize,
@@ -14,17 +14,17 @@ pub(crate) struct SeaReport {
     pub(crate) windows: usize,
     /// The open sea of each recipe.
     pub(crate) recipes: Vec<RecipeRow>,
-    /// The kinds of sea beside a learnt one, the right halves first; none without weights.
+    /// Figures of the kinds of sea, the real right halves first; empty without weights.
     pub(crate) rows: Vec<SeaRow>,
 }
 
-/// Accuracy of classifiers of the open sea of a recipe and of real windows.
+/// Accuracy of classifiers between the open sea of a recipe and real windows.
 #[derive(Debug, Serialize)]
 pub(crate) struct RecipeRow {
     pub(crate) recipe: String,
-    /// By a linear discriminant of each group of features, each image left out in turn.
+    /// Linear discriminants, one per group of features, with each image left out in turn.
     pub(crate) groups: Vec<GroupAccuracy>,
-    /// By a small network.
+    /// A small network.
     pub(crate) network: TwoSample,
 }
 
@@ -41,7 +41,7 @@ pub(crate) fn markdown(report: &SeaReport) -> String {
         + &recipes(report)
 }
 
-/// The table of the seas of recipes.
+/// Table of the seas of recipes.
 fn recipes(report: &SeaReport) -> String {
     let mut text = format!(
         "Share of windows of 128 x 128 pixels of open sea that are classified right, simulated or real: 0.5 where the kinds are \
@@ -74,7 +74,7 @@ fn recipes(report: &SeaReport) -> String {
     text + "\n"
 }
 
-/// The kinds of sea beside a learnt one.
+/// Section on the learnt sea.
 fn learnt(report: &SeaReport) -> String {
     let mut text = format!(
         "{}\n\n\
@@ -112,7 +112,7 @@ fn accuracy(found: &TwoSample) -> String {
     format!("{:.2} ± {:.2}", found.accuracy, found.half_width)
 }
 
-/// The first paragraph: what learning adds, by the numbers.
+/// First paragraph: what the learnt sea adds, in numbers.
 fn finding(report: &SeaReport) -> String {
     let find = |start: &str| -> Option<(&SeaRow, TwoSample)> {
         let row = report.rows.iter().find(|row| row.kind.starts_with(start))?;

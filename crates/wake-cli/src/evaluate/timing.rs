@@ -1,4 +1,4 @@
-//! Seconds per image: the simulator's fast methods, its harmonic sum, the wake model, and a text-to-image model.
+//! Seconds per image of the simulator's fast methods, its harmonic sum, the wake model, and a text-to-image model.
 
 use crate::exit::Outcome;
 use rand::rngs::StdRng;
@@ -17,13 +17,13 @@ use wake_train::evaluation::{HeldOut, ImageSource, TextToImage, Told};
 
 /// Pixels along a side.
 const SIZES: [usize; 3] = [128, 256, 512];
-/// Waves of sea and wake each: chosen, the paper does not state its own.
+/// Number of waves of sea and of wake: chosen; the paper does not state its own.
 const WAVES: usize = 10_000;
-/// Pixels on which the harmonic sum runs; its time is scaled to the image.
+/// Pixels of the harmonic sum, whose time is scaled to the image.
 const SAMPLE: usize = 512;
-/// Times the side of a model's own images up to which it is timed.
+/// Largest size at which a text-to-image model is timed, relative to its own image size.
 const LARGER: usize = 4;
-/// Runs of which the median counts.
+/// Timed runs, of which the median is reported.
 const RUNS: usize = 3;
 /// Fields of the surface that an image needs.
 const QUANTITIES: [Quantity; 6] = [
@@ -41,16 +41,16 @@ pub(crate) struct TimingRow {
     /// Pixels along a side.
     pub(crate) size: usize,
     pub(crate) simulator_fast: f64,
-    /// Sums of 10⁴ waves of the sea and as many of the wake alone, without backscatter and imaging; scaled up from
-    /// some pixels.
+    /// Harmonic sums of 10⁴ waves of the sea and 10⁴ of the wake only, without backscatter and imaging; scaled up from
+    /// a sample of pixels.
     pub(crate) simulator_harmonic_sum: f64,
-    /// The wake model's; absent where it draws another size only.
+    /// The wake model; `None` if it does not support this size.
     pub(crate) model: Option<f64>,
-    /// Absent where there is none, or where it cannot draw the size.
+    /// The text-to-image model; `None` without one, or if it does not support this size.
     pub(crate) text_to_image: Option<f64>,
 }
 
-/// Times all of them in one run.
+/// Times all methods.
 pub(crate) fn timings(
     model: Option<&WakeSampler>,
     text_to_image: Option<&TextToImage<'_>>,
@@ -88,7 +88,7 @@ pub(crate) fn timings(
         .collect()
 }
 
-/// Median seconds of some runs after one that does not count.
+/// Median seconds of some runs after a warm-up run.
 fn median(mut run: impl FnMut() -> Outcome<()>) -> Outcome<f64> {
     run()?;
     let mut seconds = Vec::new();
@@ -122,7 +122,7 @@ fn harmonic_seconds(scene: &Scene) -> f64 {
     let sea = Surface::new(&spectrum, scene.seed, 0.0, &raster)
         .strongest(WAVES)
         .modes();
-    // Every held-out scene has one.
+    // Every held-out scene has a ship.
     let ship = scene.ships.first().cloned().unwrap_or_default();
     let wake = KelvinWake {
         hull: Hull::wigley(ship.length, ship.beam, ship.draft),
@@ -147,7 +147,7 @@ fn harmonic_seconds(scene: &Scene) -> f64 {
             &raster,
             &pixels,
         ));
-        // A wake of fewer nodes than 10⁴ is scaled to them.
+        // A wake with fewer than 10⁴ nodes is scaled to 10⁴.
         let waves = WAVES as f64 / waves.len().max(1) as f64;
         seconds += start.elapsed().as_secs_f64() * waves;
     }

@@ -1,4 +1,4 @@
-//! `wake export hub`: a model as a folder that can be uploaded to a hub as it is.
+//! `wake export hub`: a model as a folder for upload to a hub.
 
 use std::path::PathBuf;
 
@@ -10,20 +10,20 @@ use whole_files::write_atomically;
 
 use crate::exit::{self, Outcome};
 
-/// Write a model of this program with its card as a folder that can be uploaded to Hugging Face.
+/// Write a model with its model card as a folder for upload to Hugging Face.
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// Which model
+    /// Model to export
     #[arg(value_enum)]
     model: Model,
-    /// The folder, made if absent
+    /// Folder for the files, created if absent
     #[arg(long, value_name = "DIR", default_value = "out/hub")]
     out: PathBuf,
 }
 
 #[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
 enum Model {
-    /// The detector's network, as safetensors and ONNX
+    /// Network of the detector, as safetensors and ONNX
     Detector,
     /// The wake model
     WakeModel,

@@ -7,7 +7,7 @@ use clap::Subcommand;
 
 use crate::exit::Outcome;
 
-/// Write models for other programs.
+/// Export models for other programs.
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
     #[command(subcommand)]

@@ -11,17 +11,17 @@ use wake_nn::noise::NoiseSource;
 use crate::exit::{self, Outcome};
 use crate::named;
 
-/// Write the network of the detector as an ONNX file, which onnxruntime runs without this program.
+/// Write the network of the detector as an ONNX file, which onnxruntime can run without this program.
 #[derive(clap::Args)]
 #[command(after_help = "Inputs, maps, and how wakes follow from them: docs/onnx.md")]
 pub(crate) struct Arguments {
-    /// Weights of the network, by default those in the repository
+    /// Weights of the network [default: the shipped weights]
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
-    /// The file
+    /// ONNX file to write
     #[arg(long, value_name = "FILE", default_value = "out/detector.onnx")]
     out: PathBuf,
-    /// Also write inputs and maps of ten images here (safetensors), to check another program against this one
+    /// Also write inputs and maps of ten images to this file (safetensors), to compare another program with this one
     #[arg(long, value_name = "FILE")]
     samples: Option<PathBuf>,
 }
@@ -43,7 +43,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     ))?)
 }
 
-/// Ten images of speckle with a brighter line, of several sizes, as the network reads them, and their maps.
+/// Ten images of speckle with a brighter line, of several sizes, as network inputs, and their maps.
 fn samples(detector: &Detector) -> Outcome<Vec<u8>> {
     let mut tensors = Vec::new();
     for n in 0..10usize {
@@ -74,7 +74,7 @@ fn bytes(numbers: &[f32]) -> Vec<u8> {
     numbers.iter().flat_map(|x| x.to_le_bytes()).collect()
 }
 
-/// An image of amplitudes as the network reads it: `[INPUTS, rows, columns]`.
+/// An image of amplitudes as network inputs: `[INPUTS, rows, columns]`.
 fn inputs(seed: u64, rows: usize, columns: usize) -> Vec<f32> {
     let mut pixels = NoiseSource::new(seed).normal(0, rows * columns);
     for (row, line) in pixels.chunks_exact_mut(columns).enumerate() {

@@ -1,4 +1,4 @@
-//! Twenty seconds of a wake: the water beside its radar image.
+//! Film of twenty seconds of a wake: the water beside its radar image.
 
 use super::levels::signed;
 use crate::exit::Outcome;
@@ -6,13 +6,13 @@ use crate::sheet::Picture;
 use gif::{Encoder, EncodingError, Frame, Repeat};
 use wake_physics::{Field, Result, Scene, Simulator};
 
-/// Frames, half a second of the sea each.
+/// Number of frames, half a second apart.
 const FRAMES: u32 = 40;
-/// Between frames \[s\].
+/// Time between frames \[s\].
 const STEP: f64 = 0.5;
-/// Sides of each half \[pixels\].
+/// Rows and columns of each half \[pixels\].
 const SIDE: usize = 176;
-/// Levels of a pixel that share a grey of the film: fewer greys make it smaller.
+/// Grey levels that share one level of the film: fewer levels make a smaller file.
 const LEVELS: u8 = 8;
 
 /// The film as a GIF.
@@ -57,14 +57,14 @@ fn scene(time: f64) -> Result<Scene> {
     ])
 }
 
-/// Levels about the mean, the same for every frame of a sea: black is nothing, white two and a half times the mean.
+/// Levels on a scale shared by all frames of a sea: black is zero, white is two and a half times the mean.
 fn contrast(field: &Field) -> Vec<u8> {
     let scale = 255.0 / (2.5 * field.mean().max(1e-12));
     let level = |&value: &f32| (f64::from(value) * scale).clamp(0.0, 255.0) as u8;
     field.values.iter().map(level).collect()
 }
 
-/// Pictures without colours as a film that begins again.
+/// Encodes grey pictures as an endless GIF.
 fn encoded(pictures: &[Picture]) -> std::result::Result<Vec<u8>, EncodingError> {
     let [rows, columns] = pictures[0].size();
     let palette: Vec<u8> = (0..=u8::MAX / LEVELS)

@@ -1,4 +1,4 @@
-//! What the detector finds among several ships and look-alikes.
+//! Panel of detections among several ships and look-alikes.
 
 use wake_detector::{Detector, GreyImage};
 use wake_nn::device_named;
@@ -10,10 +10,10 @@ use crate::sheet::Picture;
 
 /// Scene of three ships under way, one at rest, and slicks.
 const SCENE: &str = "assets/scenes/four_ships.toml";
-/// Pixels of the scene's image for one of the panel.
+/// Pixels of the scene's image per pixel of the panel, along each side.
 const REDUCED: usize = 2;
 
-/// The image with sure detections and their probabilities, and a small copy of it without them.
+/// The image with sure detections and their probabilities, and a small copy without them.
 pub(crate) fn panel() -> Outcome<Picture> {
     let scene = Scene::read(SCENE.as_ref())?;
     let simulation = simulate(&scene)?;

@@ -3,14 +3,14 @@
 use wake_physics::Field;
 use wake_physics::grey::GreyScale;
 
-/// Levels that fill their range.
+/// Levels that use the whole range.
 pub(crate) fn filling(field: &Field) -> Vec<u8> {
     let grey = GreyScale::filling(field);
     let level = |&value: &f32| grey.level(f64::from(value));
     field.values.iter().map(level).collect()
 }
 
-/// Levels of a field with sign: grey is zero, black and white are three standard deviations.
+/// Levels of a signed field: mid-grey is zero, black and white are three standard deviations.
 pub(crate) fn signed(field: &Field) -> Vec<u8> {
     let scale = 3.0 * field.rms().max(1e-9);
     let level = |&value: &f32| (127.5 * (1.0 + f64::from(value) / scale)).clamp(0.0, 255.0) as u8;

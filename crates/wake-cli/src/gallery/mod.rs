@@ -1,5 +1,5 @@
-//! `wake gallery`: the pictures of the documentation: the gallery, the stages from hull to image, σ⁰ against incidence, and twenty
-//! seconds of a wake.
+//! `wake gallery`: draws the pictures of the documentation: the gallery, the stages from hull to image, σ⁰ against
+//! incidence, and twenty seconds of a wake.
 
 mod film;
 mod found;
@@ -22,7 +22,7 @@ use panel::{SIDE, enlarged, labelled};
 /// Draw the pictures of the documentation.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Folder of the pictures, made if absent
+    /// Folder for the pictures, created if absent
     #[arg(long, value_name = "DIR", default_value = "docs/images")]
     out: PathBuf,
 }
@@ -30,7 +30,7 @@ pub(crate) struct Arguments {
 /// Pictures in a row.
 const ACROSS: usize = 3;
 
-/// Scenes of the gallery: a file, what is changed, and the caption.
+/// Scenes of the gallery: file, changes and caption.
 const SCENES: [(&str, &[&str], &str); 4] = [
     (
         "airborne",
@@ -77,7 +77,7 @@ const SCENES: [(&str, &[&str], &str); 4] = [
         "TerraSAR-X stripmap, X band VV, 3 m pixels, wind 4 m/s: dark line, displaced echo",
     ),
 ];
-/// The generated image: a prompt, and the caption.
+/// Prompt and caption of the generated image.
 const PROMPT: &str = "a ship at 10 m/s toward 120 degrees, wind 3 m/s toward 60 degrees";
 const GENERATED: &str =
     "Generated from a sentence by the diffusion model, X band VV, 4 m pixels, wind 3 m/s";
@@ -119,7 +119,7 @@ fn gallery() -> Outcome<Picture> {
     Ok(Picture::sheet(&pictures, ACROSS))
 }
 
-/// An image of the wake model, as large as the others.
+/// An image of the wake model, scaled to the size of the others.
 fn generated() -> Outcome<Picture> {
     let sampler = WakeSampler::pretrained(&device_named("flex")?)?;
     let image = sampler.sample(PROMPT, 7)?;

@@ -1,27 +1,27 @@
-//! A panel of the gallery: an image with scale bar and arrows, and a small copy of it with its labels.
+//! Panel of the gallery: an image with scale bar and arrows, and a small copy with its labels.
 
 use wake_physics::labels::{Labels, Line, Pixel};
 
 use crate::sheet::{Colour, INK, LETTER, LINE, PAPER, Picture};
 
-/// Sides of a panel \[pixels\].
+/// Rows and columns of a panel \[pixels\].
 pub(crate) const SIDE: usize = 384;
-/// A pixel of the small copy stands for so many along each side.
+/// Pixels of the panel per pixel of the small copy, along each side.
 const SMALLER: usize = 3;
-/// Lengths that a scale bar may have \[m\].
+/// Possible lengths of a scale bar \[m\].
 const BARS: [f64; 7] = [50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0];
-/// From the sides of the panel \[pixels\].
+/// Distance of marks from the sides of the panel \[pixels\].
 const EDGE: usize = 6;
 /// Width of bars and arrows, and length of an arrow \[pixels\].
 const STROKE: usize = 2;
 const ARROW: usize = 36;
-/// Detections.
+/// Colour of detections.
 pub(crate) const FOUND: Colour = [255, 176, 0];
 
-/// The image with marks, and with its labels in a small copy at the lower right.
+/// The image with scale bar and arrows, and a small copy with labels at the lower right.
 ///
-/// - `levels`: of `SIDE` × `SIDE` pixels
-/// - `spacing`: side of a pixel \[m\]
+/// - `levels`: levels of `SIDE` × `SIDE` pixels
+/// - `spacing`: pixel spacing \[m\]
 pub(crate) fn labelled(levels: &[u8], spacing: f64, labels: &Labels) -> Picture {
     let mut picture = marked(levels, spacing);
     let mut small = Picture::reduced(levels, SIDE, SIDE / SMALLER);
@@ -30,7 +30,7 @@ pub(crate) fn labelled(levels: &[u8], spacing: f64, labels: &Labels) -> Picture 
     picture
 }
 
-/// The image with marks.
+/// The image with scale bar and arrows.
 pub(crate) fn marked(levels: &[u8], spacing: f64) -> Picture {
     let mut picture = Picture::from_levels(levels, SIDE);
     scale_bar(&mut picture, spacing);
@@ -38,7 +38,7 @@ pub(crate) fn marked(levels: &[u8], spacing: f64) -> Picture {
     picture
 }
 
-/// Sets a small copy at the lower right, with a frame.
+/// Inserts a small copy with a frame at the lower right.
 pub(crate) fn set_in(picture: &mut Picture, small: &Picture) {
     let [rows, columns] = small.size();
     let [top, left] = [SIDE - rows - EDGE, SIDE - columns - EDGE];
@@ -46,7 +46,7 @@ pub(crate) fn set_in(picture: &mut Picture, small: &Picture) {
     picture.paste(small, top, left);
 }
 
-/// A bar of a round length, at most a quarter of the panel, and its length in words.
+/// Draws a bar of a round length, at most a quarter of the panel, labelled with its length.
 fn scale_bar(picture: &mut Picture, spacing: f64) {
     let most = SIDE as f64 * spacing / 4.0;
     let length = BARS.into_iter().rfind(|&bar| bar <= most).unwrap_or(most);
@@ -66,7 +66,7 @@ fn scale_bar(picture: &mut Picture, spacing: f64) {
     }
 }
 
-/// Azimuth upward, along the flight, and range to the right, away from the radar.
+/// Draws arrows: azimuth upward, along the flight; range to the right, away from the radar.
 fn arrows(picture: &mut Picture) {
     let (left, corner) = (2 * EDGE, 2 * EDGE + ARROW);
     let wide = ARROW + EDGE + "range".len() * LETTER + 2 * EDGE;
@@ -82,10 +82,10 @@ fn arrows(picture: &mut Picture) {
     picture.write_text("range", corner - LINE / 2, left + ARROW + EDGE / 2);
 }
 
-/// Labels of the small copy.
+/// Labels in the pixels of the small copy.
 fn reduced(labels: &Labels) -> Labels {
     let small = 1.0 / SMALLER as f64;
-    // Centres of pixels have whole numbers.
+    // Pixel centres have integer coordinates.
     let place = |p: Pixel| p.map(|v| (v + 0.5) * small - 0.5);
     let line = |line: &Line| line.iter().map(|&p| place(p)).collect::<Line>();
     let frame = |[x, y, width, height]: [f64; 4]| {
@@ -104,7 +104,7 @@ fn reduced(labels: &Labels) -> Labels {
     labels
 }
 
-/// An image of another size at `SIDE` × `SIDE` pixels, bilinear.
+/// Resamples an image to `SIDE` × `SIDE` pixels, bilinearly.
 pub(crate) fn enlarged(levels: &[u8], side: usize) -> Vec<u8> {
     let at = |row: usize, column: usize| f64::from(levels[row * side + column]);
     let place = |n: usize| {
@@ -132,7 +132,7 @@ mod tests {
         let expected = |column: usize| ((column as f64 + 0.5) * 256.0 / 384.0 - 0.5) / 2.0;
         for column in 3..SIDE - 3 {
             let level = f64::from(large[7 * SIDE + column]);
-            // Half a level of rounding here, and as much in the image.
+            // Half a level of rounding here, and half a level in the image.
             assert!((level - expected(column)).abs() <= 1.0, "{column}: {level}");
         }
     }
@@ -142,7 +142,7 @@ mod tests {
         let picture = marked(&vec![0; SIDE * SIDE], 10.0);
         let row = SIDE - LINE - 3 * EDGE + LINE + EDGE / 2;
         let bright = (0..SIDE).filter(|&column| picture.at(row, column) == INK);
-        // 500 m of 10 m pixels, and the end's stroke.
+        // 500 m in pixels of 10 m, and the end's stroke.
         assert_eq!(bright.count(), 50 + STROKE);
     }
 }

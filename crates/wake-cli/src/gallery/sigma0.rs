@@ -1,4 +1,4 @@
-//! σ⁰ of the open sea against incidence and wind, at C band beside CMOD5.N.
+//! Plot of open-sea σ⁰ against incidence and wind, at C band with CMOD5.N.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::path::Path;
@@ -16,25 +16,26 @@ use crate::exit::Outcome;
 /// Frequencies \[Hz\]: C band, for which CMOD5.N was fitted, and the default X band.
 const C_BAND: f64 = 5.3e9;
 const X_BAND: f64 = 9.6e9;
-/// Winds \[m/s\], each with a colour.
+/// Wind speeds \[m/s\], each with a colour.
 const WINDS: [(f64, RGBColor); 4] = [
     (3.0, RGBColor(31, 119, 180)),
     (5.0, RGBColor(44, 160, 44)),
     (7.0, RGBColor(230, 120, 0)),
     (10.0, RGBColor(214, 39, 40)),
 ];
-/// Ends of the incidence \[deg\], and the steps between them.
+/// Range of incidence \[deg\], and number of steps in it.
 const INCIDENCE: [f64; 2] = [20.0, 50.0];
 const STEPS: u32 = 30;
-/// Ends of σ⁰ \[dB\].
+/// Range of σ⁰ \[dB\].
 const DECIBELS: [f64; 2] = [-32.0, 4.0];
 /// Speed of light \[m/s\].
 const LIGHT: f64 = 299_792_458.0;
-/// A direction of the wind: its name, its unit vector, and its angle from upwind \[rad\].
+/// Wind directions: name, unit vector, and angle from upwind \[rad\].
 const UPWIND: (&str, [f64; 2], f64) = ("upwind", [-1.0, 0.0], 0.0);
 const CROSSWIND: (&str, [f64; 2], f64) = ("across the wind", [0.0, 1.0], FRAC_PI_2);
 
-/// Three panels: C band upwind and across the wind with CMOD5.N as dots, and X band upwind, for which there is no such model here.
+/// Draws three panels: C band upwind and crosswind with CMOD5.N as dots, and X band upwind, for which there is no such
+/// model here.
 pub(crate) fn draw(path: &Path) -> Outcome<()> {
     let area = SVGBackend::new(path, (1080, 420)).into_drawing_area();
     area.fill(&WHITE)?;

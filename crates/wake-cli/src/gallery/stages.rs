@@ -1,4 +1,4 @@
-//! The stages from hull to image, a panel each.
+//! Sheet of the stages from hull to image, a panel each.
 
 use super::levels::{filling, signed};
 use crate::sheet::Picture;

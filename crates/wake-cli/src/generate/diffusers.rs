@@ -1,4 +1,4 @@
-//! A model in the layout of diffusers, such as Stable Diffusion v1.4.
+//! Generates images with a model in diffusers layout, such as Stable Diffusion v1.4.
 
 use std::path::Path;
 use std::time::Instant;
@@ -17,12 +17,22 @@ use super::results::{finish, numbered};
 use crate::exit::Outcome;
 use crate::progress;
 
-/// Steps, unless others are asked for.
+/// Default number of steps.
 const STEPS: usize = 50;
-/// Guidance, unless another is asked for.
+/// Default guidance scale.
 const GUIDANCE: f64 = 7.5;
 
 pub(crate) fn run(arguments: &Arguments, weights: &Path) -> Outcome<()> {
+    for (given, option) in [
+        (arguments.sea.is_some(), "--sea"),
+        (arguments.overlay, "--overlay"),
+    ] {
+        if given {
+            return Err(
+                format!("{option} is for the wake model; leave it out, or --weights").into(),
+            );
+        }
+    }
     let scene = arguments.scene(Scene::default)?;
     let prompt = arguments.prompt(scene.as_ref())?;
     let device = device_named(&arguments.device)?;
@@ -47,7 +57,7 @@ pub(crate) fn run(arguments: &Arguments, weights: &Path) -> Outcome<()> {
     finish(arguments, &report)
 }
 
-/// Refuses a scene whose image has another size than the model's.
+/// Rejects a scene whose image size differs from the model's.
 fn check_grid(scene: Option<&Scene>, [rows, columns]: [usize; 2]) -> Result<(), String> {
     match scene.map(|scene| &scene.grid) {
         Some(grid) if [grid.rows, grid.columns] != [rows, columns] => Err(format!(
@@ -59,7 +69,7 @@ fn check_grid(scene: Option<&Scene>, [rows, columns]: [usize; 2]) -> Result<(), 
     }
 }
 
-/// A model's own scheduler, or one of another class with its options.
+/// The model's own scheduler, or another class with the same options.
 pub(crate) fn scheduler_of(
     pipeline: &Pipeline,
     name: Option<&str>,
@@ -67,7 +77,7 @@ pub(crate) fn scheduler_of(
     let own = pipeline.scheduler().clone();
     match name {
         None => Ok(own),
-        // A model's file may leave clipping to the default, which latents must not have.
+        // The model's file may leave clipping to its default, but latents must not be clipped.
         Some(name) => Ok(own
             .with(SchedulerOption::ClipSample(false))?
             .with_class(name)?),
@@ -88,7 +98,7 @@ fn request(arguments: &Arguments, prompt: &str, scheduler: SchedulerConfig) -> R
         .with_seed(arguments.seed)
 }
 
-/// Runs the stages, each with its seconds.
+/// Runs the stages; returns the images and the seconds of each stage.
 fn generate(
     pipeline: &Pipeline,
     request: &Request,
@@ -96,20 +106,20 @@ fn generate(
     prompt: &str,
 ) -> Outcome<(Tensor<4>, Value)> {
     let begin = Instant::now();
-    // Embeddings are remembered, so the run finds them ready.
+    // Embeddings are cached, so the run does not compute them again.
     pipeline.embed(&[prompt, negative(arguments)]);
     let text = begin.elapsed().as_secs_f64();
 
     let begin = Instant::now();
     let mut sampling = pipeline.sample(request)?;
-    // A request that is refused leaves no folder behind.
+    // A rejected request leaves no folder behind.
     whole_files::make_folder(&arguments.out)?;
     let bar = progress::bar(sampling.len() as u64, "steps");
     for progress in sampling.by_ref() {
         bar.set_position(progress.done as u64);
     }
     bar.finish_and_clear();
-    // Reading a number waits for the device.
+    // Reading the numbers waits for the device.
     let latents = sampling.latents();
     latents.to_data();
     let denoise = begin.elapsed().as_secs_f64();

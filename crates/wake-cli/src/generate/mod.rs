@@ -1,4 +1,4 @@
-//! `wake generate`: a sentence (or a scene) becomes a radar image with the diffusion model.
+//! `wake generate`: generates radar images from a sentence (or a scene) with a diffusion model.
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
@@ -12,17 +12,14 @@ pub(crate) use arguments::Arguments;
 #[cfg(feature = "train")]
 pub(crate) use diffusers::scheduler_of;
 
-/// Writes `image.png` (`image-0.png`, `image-1.png`, … and all of them as `sheet.png` with `--count`) and `report.json`; the
-/// wake model also writes the labels of each image (`labels.json`, `labels-0.json`, …), and says which scene it drew (what
-/// the prompt states, and the default values of what it leaves open) and which parts of the prompt it did not read. A prompt
-/// that states nothing of a scene is an error.
+/// Writes `image.png` and `report.json`; with `--count`, `image-0.png`, `image-1.png`, … and all of them as
+/// `sheet.png`. The wake model also writes the labels of each image (`labels.json`, `labels-0.json`, …), and prints the
+/// scene of the image (the prompt's values, and defaults for the rest) and the parts of the prompt that it did not
+/// read. A prompt that states nothing about a scene is an error.
 pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     match arguments.weights.as_deref() {
         None => wake_model::run(arguments),
-        Some(folder) if folder.join("unet").is_dir() => match &arguments.sea {
-            None => diffusers::run(arguments, folder),
-            Some(_) => Err("--sea is for the wake model; leave it out, or --weights".into()),
-        },
+        Some(folder) if folder.join("unet").is_dir() => diffusers::run(arguments, folder),
         Some(_) if arguments.lora.is_some() => {
             Err("--lora is for a model in diffusers layout; leave it out".into())
         }

@@ -1,11 +1,11 @@
-//! Names of the files, and the report.
+//! File names and report.
 
 use serde_json::Value;
 
 use super::arguments::Arguments;
 use crate::exit::{self, Outcome};
 
-/// The name of file `k` of `count` of one kind.
+/// Name of file `k` of `count` of one kind.
 pub(super) fn numbered(stem: &str, k: usize, count: usize, ending: &str) -> String {
     match count {
         1 => format!("{stem}.{ending}"),
@@ -13,7 +13,7 @@ pub(super) fn numbered(stem: &str, k: usize, count: usize, ending: &str) -> Stri
     }
 }
 
-/// Writes the report and says what was made.
+/// Writes the report and prints a summary.
 pub(super) fn finish(arguments: &Arguments, report: &Value) -> Outcome<()> {
     let out = &arguments.out;
     whole_files::write_json(&out.join("report.json"), report)?;

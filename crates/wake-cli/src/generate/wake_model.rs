@@ -1,4 +1,4 @@
-//! The small model of `wake-ldm`, or one that `train` wrote.
+//! Generates images with the wake model of `wake-ldm`, or one of `wake train`.
 
 use std::path::Path;
 use std::time::Instant;
@@ -38,7 +38,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     let prompt = arguments.prompt(scene.as_ref())?;
     let reading = Reading::of(&prompt)?;
     let (count, seed) = (arguments.count, arguments.seed);
-    // All images as one batch.
+    // Samples all images as one batch.
     let images = match &scene {
         Some(scene) => sampler.sample_scenes(&seeded(scene, seed, count))?,
         None => sampler.sample_many(&vec![prompt.as_str(); count], seed)?,
@@ -65,7 +65,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     finish(arguments, &report)
 }
 
-/// A scene with seeds that count up.
+/// Copies of a scene with consecutive seeds.
 fn seeded(scene: &Scene, seed: u64, count: usize) -> Vec<Scene> {
     let seeds = (0..count as u64).map(|k| seed.wrapping_add(k));
     let scenes = seeds.map(|seed| Scene {
@@ -75,7 +75,7 @@ fn seeded(scene: &Scene, seed: u64, count: usize) -> Vec<Scene> {
     scenes.collect()
 }
 
-/// The small model has one sampler and no guidance, and draws all images at once.
+/// Rejects options of other models: the wake model has one sampler and no guidance, and draws all images at once.
 fn refuse_options(arguments: &Arguments) -> Result<(), String> {
     let given = [
         ("--scheduler", arguments.scheduler.is_some()),
@@ -93,7 +93,7 @@ fn refuse_options(arguments: &Arguments) -> Result<(), String> {
     Ok(())
 }
 
-/// Writes each image with its labels, and sheets of them, and returns the names of the pictures.
+/// Writes each image with its labels, and sheets; returns the names of the pictures.
 fn write_images(images: &[WakeImage], arguments: &Arguments) -> wake_physics::Result<Vec<String>> {
     let (out, count) = (&arguments.out, images.len());
     let columns = images[0].grey.columns;
@@ -124,7 +124,7 @@ fn write_images(images: &[WakeImage], arguments: &Arguments) -> wake_physics::Re
     Ok(names)
 }
 
-/// Writes pictures as one, each below its seed.
+/// Writes pictures as one sheet, each with its seed as caption.
 fn sheet(pictures: &[Picture], images: &[WakeImage], path: &Path) -> wake_physics::Result<()> {
     let pictures = pictures.iter().zip(images);
     let captioned: Vec<Picture> = pictures

@@ -1,9 +1,9 @@
-//! What lies across the wakes of simulated and real images, as a table.
+//! Table of profiles across the wakes of simulated and real images.
 
 use super::figures::{ImageFigures, WakeFigures};
 use super::profile::{Streak, WakeProfile};
 
-/// The table with its title.
+/// Lines of the table with its title.
 pub(crate) fn lines(simulated: &[ImageFigures], real: &[ImageFigures]) -> Vec<String> {
     let mut lines: Vec<String> = vec![
         String::new(),
@@ -60,12 +60,12 @@ fn of_wake(wake: &WakeFigures) -> String {
     )
 }
 
-/// Distance between dark line and bright streak.
+/// Distance between dark line and bright streak \[pixels\].
 fn apart(profile: &WakeProfile) -> Option<f64> {
     Some((profile.bright?.offset - profile.dark?.offset).abs())
 }
 
-/// Least to most of each figure over the real wakes, all stretches together.
+/// Smallest and largest value of each figure over the real wakes, all stretches together.
 fn range(wakes: &[&WakeFigures]) -> String {
     let profiles = || {
         wakes

@@ -1,11 +1,11 @@
-//! Simulated images beside real ones, as a page: the texture of their open sea.
+//! Markdown page that compares simulated and real images.
 
 use super::figures::{ImageFigures, StatedSpeckle};
 use wake_physics::measure::Texture;
 
 use super::across;
 
-/// Both tables as a page of Markdown.
+/// The tables of open sea and of wakes as a Markdown page.
 pub(crate) fn page(simulated: &[ImageFigures], real: &[ImageFigures]) -> String {
     let mut lines: Vec<String> = vec![
         "## Open sea".into(),
@@ -38,7 +38,7 @@ fn of_stated(stated: &StatedSpeckle) -> String {
 
 fn joined(values: &[f64], digits: usize) -> String {
     let values = values.iter().map(|v| {
-        // A correlation of −0.001 is 0.00.
+        // Formats a correlation of −0.001 as 0.00.
         let text = format!("{v:.digits$}");
         if text.trim_start_matches(['-', '0', '.']).is_empty() {
             text.trim_start_matches('-').to_owned()
@@ -60,7 +60,7 @@ fn of_texture(name: &str, t: &Texture) -> String {
     )
 }
 
-/// The smallest, the middle and the largest of each figure over the real images.
+/// Minimum, median and maximum of each figure over the real images.
 fn quantiles(textures: &[&Texture]) -> Option<[String; 3]> {
     let at = |share: f64, of: &dyn Fn(&Texture) -> f64| {
         let mut values: Vec<f64> = textures.iter().map(|t| of(t)).collect();

@@ -1,5 +1,4 @@
-//! Figures of one image that stand beside those of others, simulated or real: the texture of its sea, and what lies across
-//! its wakes.
+//! Figures of one simulated or real image, for comparison with others: sea texture, and profiles across wakes.
 
 use serde::Serialize;
 
@@ -10,46 +9,46 @@ use wake_physics::{Field, Scene, Simulation};
 
 /// Side of the windows of open sea \[pixels\].
 const SIDE: usize = 256;
-/// Stretches of a wake from its tip \[pixels\].
+/// Distances from the tip of a wake over which profiles are averaged \[pixels\].
 const STRETCHES: [[f64; 2]; 3] = [[25.0, 85.0], [85.0, 170.0], [170.0, 300.0]];
 
-/// What is measured in one image of amplitude.
+/// Measurements of one amplitude image.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct ImageFigures {
     /// Name of the image.
     pub(crate) name: String,
-    /// What window, resolution and looks say of the speckle of a simulated image.
+    /// Speckle statistics that window, resolution and looks imply, for a simulated image.
     pub(crate) stated: Option<StatedSpeckle>,
-    /// The texture of its open sea, in windows of 256 pixels a side; `None` where no window holds sea alone.
+    /// Texture of its open sea, in windows of 256 pixels a side; `None` if no window contains only sea.
     pub(crate) texture: Option<Texture>,
-    /// What lies across its wakes.
+    /// Profiles across its wakes.
     pub(crate) wakes: Vec<WakeFigures>,
 }
 
 /// Speckle in closed form, see [`amplitude_correlation`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(crate) struct StatedSpeckle {
-    /// Independent looks that overlapping ones are worth.
+    /// Equivalent number of independent looks.
     pub(crate) looks: f64,
     /// Correlation of amplitudes one, two and three pixels apart in a row.
     pub(crate) along_rows: [f64; 3],
-    /// The same in a column.
+    /// Correlation of amplitudes one, two and three pixels apart in a column.
     pub(crate) along_columns: [f64; 3],
 }
 
-/// What lies across one wake, 25 to 85, 85 to 170 and 170 to 300 pixels from its tip.
+/// Profiles across one wake, 25 to 85, 85 to 170 and 170 to 300 pixels from its tip.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct WakeFigures {
-    /// Names of the image and of the wake in it.
+    /// Names of the image and the wake.
     pub(crate) name: String,
     /// Dark line and bright streak of each stretch.
     pub(crate) stretches: [Option<WakeProfile>; 3],
-    /// Arms of each stretch, on either side of the axis.
+    /// Arms in each stretch, on either side of the axis.
     pub(crate) arms: [[Option<Streak>; 2]; 3],
 }
 
 impl ImageFigures {
-    /// Those of a simulated image with speckle; its wakes are called by letters.
+    /// Figures of a simulated image with speckle; its wakes are named by letters.
     pub(crate) fn of_simulation(name: &str, simulation: &Simulation) -> Self {
         let mut amplitude = simulation.speckled.clone();
         amplitude.values.iter_mut().for_each(|v| *v = v.sqrt());
@@ -70,9 +69,9 @@ impl ImageFigures {
         }
     }
 
-    /// Those of an image that is linear in amplitude.
+    /// Figures of an image that is linear in amplitude.
     ///
-    /// - `wakes`: the axes of its wakes by their names
+    /// - `wakes`: names and axes of its wakes
     pub(crate) fn of_amplitude(
         name: &str,
         amplitude: &Field,
@@ -93,9 +92,9 @@ impl ImageFigures {
 }
 
 impl StatedSpeckle {
-    /// That of a scene's radar.
+    /// Speckle statistics of a scene's radar.
     ///
-    /// - `spacing`: of the pixels \[m\]
+    /// - `spacing`: pixel spacing \[m\]
     pub(crate) fn of(scene: &Scene, spacing: f64) -> Self {
         let radar = &scene.radar;
         let window = radar.window.unwrap_or(Window::Uniform);
@@ -127,7 +126,8 @@ fn letter(n: usize) -> String {
 mod tests {
     use super::*;
 
-    /// A uniform window has sinc²: zero at whole numbers of resolution cells, (2/π)² of the intensity at half of one.
+    /// A uniform window has a correlation of sinc²: zero at whole resolution cells, (2/π)² of the intensity at half a
+    /// cell.
     #[test]
     fn speckle_is_correlated_as_the_window_says() {
         let mut scene = Scene::default();

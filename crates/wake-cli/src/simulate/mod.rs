@@ -1,4 +1,4 @@
-//! `wake simulate`: from a scene to a SAR image, with every field, the labels and a report.
+//! `wake simulate`: simulates a SAR image from a scene, with all fields, labels and a report.
 
 mod across;
 mod arguments;
@@ -23,18 +23,18 @@ use wake_physics::{Method, Plan, Scene, Simulation, simulate_with};
 const SIDE: usize = 334;
 const ACROSS: usize = 3;
 
-/// Writes `image.png`, `fields.safetensors`, `labels.json` and `report.json`, of several scenes into a folder each; with
-/// `--only-image` the image alone; with
-/// `--overlay` the picture with its labels drawn, `overlay.png`; with `--export` every field as a NumPy array or a TIFF with
-/// the size of its pixels; with `--compare` open sea and wakes beside those of real images, `comparison.md` and
-/// `comparison.json`, and quick-looks of what was simulated, `sheet.png`. With `--product` a Sentinel-1 product of a real place.
+/// Writes `image.png`, `fields.safetensors`, `labels.json` and `report.json`, in one folder for each of several scenes.
+/// `--only-image` writes only the image. `--overlay` adds the picture with its labels, `overlay.png`; `--export` adds
+/// every field as a NumPy array or a TIFF with the pixel size; `--compare` adds tables of open sea and wakes beside
+/// real images, `comparison.md` and `comparison.json`, and quick-looks of the simulated images, `sheet.png`.
+/// `--product` writes a Sentinel-1 product of a real place instead.
 pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     if let Some(template) = &arguments.product.product {
         let (changes, out) = (&arguments.set, &arguments.out);
         return product::run(&arguments.product, template, changes, out, arguments.json);
     }
     let scenes = scenes(arguments)?;
-    // A scene that cannot be simulated leaves no folder behind.
+    // Fails before creating a folder if a scene cannot be simulated.
     let plans = scenes.iter().map(|(_, scene)| Plan::new(scene));
     for plan in plans.collect::<wake_physics::Result<Vec<_>>>()? {
         let cost = plan.cost();
@@ -82,7 +82,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     Ok(())
 }
 
-/// The scenes by the names of their files.
+/// Scenes and the names of their files.
 fn scenes(arguments: &Arguments) -> Outcome<Vec<(String, Scene)>> {
     let changed = |scene: Scene| scene.with_assignments(&arguments.set);
     if arguments.scene.is_empty() {

@@ -1,4 +1,4 @@
-//! `wake simulate --product`: ships on the map become a product with a truth.
+//! `wake simulate --product`: simulates ships on a map as a satellite product with ground truth.
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -12,17 +12,17 @@ use crate::exit::{self, Outcome};
 use crate::locate::polarization;
 use crate::progress;
 
-/// What is asked for of a product.
+/// Arguments of the simulated product.
 #[derive(Args)]
 #[command(next_help_heading = "Products")]
 pub(crate) struct ProductArguments {
-    /// Simulate a Sentinel-1 product on the annotation of this one (.SAFE folder or .zip; VV or HH)
+    /// Simulate a Sentinel-1 product with the annotation of this one (.SAFE folder or .zip; VV or HH)
     #[arg(long, value_name = "PRODUCT", conflicts_with_all = ["scene", "method", "grey", "overlay", "export", "compare"])]
     pub(crate) product: Option<PathBuf>,
-    /// Ships as GeoJSON points with heading (from true north), speed (m/s) and length (m)
+    /// Ships as GeoJSON points with heading (degrees from true north), speed (m/s) and length (m)
     #[arg(long, value_name = "FILE", requires = "product")]
     ships: Option<PathBuf>,
-    /// Wind at 10 m (m/s)
+    /// Wind speed at 10 m height (m/s)
     #[arg(
         long,
         value_name = "N",
@@ -30,7 +30,7 @@ pub(crate) struct ProductArguments {
         default_value_if("product", clap::builder::ArgPredicate::IsPresent, "5")
     )]
     wind_speed: Option<f64>,
-    /// Direction that the wind blows toward, clockwise from true north (degrees)
+    /// Direction toward which the wind blows, clockwise from true north (degrees)
     #[arg(
         long,
         value_name = "N",
@@ -39,13 +39,13 @@ pub(crate) struct ProductArguments {
         default_value_if("product", clap::builder::ArgPredicate::IsPresent, "90")
     )]
     wind_toward: Option<f64>,
-    /// Range of lines to simulate, counted from 0, the last not included; by default all
+    /// Lines to simulate, counted from 0, end excluded [default: all]
     #[arg(long, value_name = "A..B", requires = "product", value_parser = range)]
     lines: Option<Range<usize>>,
-    /// Range of pixels to simulate; by default all
+    /// Pixels of a line to simulate, counted from 0, end excluded [default: all]
     #[arg(long, value_name = "C..D", requires = "product", value_parser = range)]
     pixels: Option<Range<usize>>,
-    /// VV or HH, by default the first of these that the product has
+    /// Polarization: VV or HH [default: the first of these in the product]
     #[arg(long, requires = "product", value_parser = polarization)]
     polarization: Option<wake_geo::Polarization>,
     /// Seed of all random numbers
@@ -58,9 +58,9 @@ pub(crate) struct ProductArguments {
     seed: Option<u64>,
 }
 
-/// Simulates the product, and prints where it is.
+/// Simulates the product and prints its path.
 ///
-/// - `changes`: keys of the scene and their values
+/// - `changes`: scene keys and their values
 pub(crate) fn run(
     arguments: &ProductArguments,
     template: &PathBuf,
@@ -108,7 +108,7 @@ pub(crate) fn run(
     })?)
 }
 
-/// Reads `A..B`.
+/// Parses `A..B`.
 fn range(text: &str) -> Result<Range<usize>, String> {
     let number = |text: &str| text.trim().parse().ok();
     text.split_once("..")

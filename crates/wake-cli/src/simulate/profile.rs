@@ -1,65 +1,65 @@
-//! Profiles across a wake: the dark line, the streak beside it, and the arms.
+//! Profiles across a wake: dark line, bright streak and arms.
 
 use serde::Serialize;
 use wake_physics::Field;
 use wake_physics::labels::Pixel;
 
-/// A pixel this many standard deviations over the sea is a ship and does not count: chosen, as for textures.
+/// Pixels more than this many standard deviations above the sea are ships and are left out: chosen, as for textures.
 const SHIP: f64 = 8.0;
 
-/// A streak shows where the profile lies this many of its own standard deviations off the sea: of some hundred places
-/// looked at, one in a hundred does so by chance.
+/// A streak is reported if the profile differs from the sea by this many of its own standard deviations: of some
+/// hundred places tested, one in a hundred does so by chance.
 const SHOWS: f64 = 4.0;
 
-/// Angles to the axis at which the sea lies, beyond the arms \[deg\].
+/// Angles from the axis that count as sea, beyond the arms \[deg\].
 const SEA: [f64; 2] = [25.0, 40.0];
 
-/// Farthest angle from the axis of the dark line, and of the bright streak from it \[deg\]: chosen.
+/// Largest angle of the dark line from the axis, and of the bright streak from the dark line \[deg\]: chosen.
 const BESIDE: f64 = 10.0;
 
-/// Angles between the axis and arms \[deg\]: chosen around 19.5, narrower at speed.
+/// Angles of the arms from the axis \[deg\]: chosen around 19.5, with room for the narrower wakes at speed.
 const ARMS: [f64; 2] = [11.0, 23.0];
 
-/// Fewest pixels in the mean of one place of a profile.
+/// Fewest pixels in the mean at one position of a profile.
 const FEWEST: usize = 12;
 
 /// The axis of a wake in an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct WakeAxis {
-    /// Where the wake starts, (column, row).
+    /// Tip of the wake, (column, row).
     pub(crate) tip: Pixel,
-    /// From the tip along the wake [deg clockwise from the image's up].
+    /// Direction from the tip along the wake [deg clockwise from the image's up].
     pub(crate) direction: f64,
 }
 
 /// A line of an image that is darker or brighter than the sea around it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(crate) struct Streak {
-    /// Distance of its middle from the axis, positive clockwise of it \[pixels\]; of an arm the angle \[deg\].
+    /// Distance of its middle from the axis, positive clockwise \[pixels\]; for an arm, the angle \[deg\].
     pub(crate) offset: f64,
-    /// Amplitude over that of the sea, less 1.
+    /// Amplitude relative to the sea, minus 1.
     pub(crate) contrast: f64,
-    /// Difference from the sea over the standard deviation of one pixel of the sea, which no linear grey changes.
+    /// Difference from the sea in standard deviations of a sea pixel, which is invariant to linear changes of grey.
     pub(crate) strength: f64,
-    /// Width at half of the difference \[pixels\].
+    /// Width at half height \[pixels\].
     pub(crate) width: f64,
 }
 
-/// What lies across a stretch of a wake.
+/// Streaks across a stretch of a wake.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(crate) struct WakeProfile {
-    /// The darkest line within 10° of the axis, if one shows.
+    /// Darkest line within 10° of the axis, if one is significant.
     pub(crate) dark: Option<Streak>,
-    /// The brightest line within 10° of the dark one, or of the axis.
+    /// Brightest line within 10° of the dark one, or of the axis.
     pub(crate) bright: Option<Streak>,
 }
 
-/// Profile across a wake, averaged over a stretch along its axis; `None` where the image has too little sea beside it.
+/// Profile across a wake, averaged over a stretch along its axis; `None` if the image has too little sea beside it.
 ///
-/// - `amplitude`: √ of the intensity, or the grey of a quick-look
+/// - `amplitude`: square root of the intensity, or the grey of a quick-look
 /// - `astern`: distances from the tip along the axis \[pixels\], above 0
 ///
-/// Streaks narrower than three pixels look as wide as that.
+/// Streaks narrower than three pixels are measured as three pixels wide.
 pub(super) fn wake_profile(
     amplitude: &Field,
     axis: &WakeAxis,
@@ -75,8 +75,8 @@ pub(super) fn wake_profile(
     Some(WakeProfile { dark, bright })
 }
 
-/// The arms of a wake, counter-clockwise of its axis and clockwise of it, averaged along rays from the tip: the line that
-/// differs most from the sea on each side, 11 to 23° off the axis, bright or dark. Its offset is an angle \[deg\], its width
+/// Arms of a wake, counter-clockwise and clockwise of its axis, averaged along rays from the tip: on each side the line
+/// that differs most from the sea, bright or dark, 11 to 23° off the axis. Its offset is an angle \[deg\], its width is
 /// in pixels half-way along the stretch.
 ///
 /// - `amplitude`, `astern` as in [`wake_profile`]
@@ -103,18 +103,18 @@ pub(super) fn wake_arms(
     })
 }
 
-/// Means of the amplitude by a coordinate across the wake, one a unit, over those of the sea.
+/// Means of the amplitude by a coordinate across the wake, one per unit, relative to the sea.
 struct Profile {
-    /// Differences from the sea at the coordinates −`reach` to `reach`; NaN where there are too few pixels.
+    /// Differences from the sea at coordinates −`reach` to `reach`; NaN where there are too few pixels.
     differences: Vec<f64>,
     reach: i64,
-    /// Mean of the sea, standard deviation of its pixels, and of its means.
+    /// Mean of the sea, standard deviation of its pixels, and standard deviation of its means.
     sea: [f64; 3],
 }
 
 impl Profile {
-    /// - `sea`: coordinates of the sea, on either side
-    /// - `coordinate` from the distances along the axis and across it
+    /// - `sea`: range of coordinates of the sea, on either side
+    /// - `coordinate`: function of the distances along and across the axis
     fn new(
         amplitude: &Field,
         axis: &WakeAxis,
@@ -162,7 +162,7 @@ impl Profile {
                 }
             })
             .collect();
-        // Three neighbours together: one of them has a share of the speckle of its own.
+        // Averages three neighbours, which reduces the speckle of each.
         let smooth: Vec<f64> = (0..means.len())
             .map(|n| {
                 let [a, b] = [n.saturating_sub(1), (n + 2).min(means.len())];
@@ -188,7 +188,7 @@ impl Profile {
         })
     }
 
-    /// The line that is darkest (sign −1) or brightest (1) between two coordinates, if it shows.
+    /// The darkest (sign −1) or brightest (1) line between two coordinates, if it is significant.
     fn extreme(&self, sign: f64, [from, to]: [f64; 2]) -> Option<Streak> {
         let at = |u: i64| {
             let bin = usize::try_from(u + self.reach).ok();
@@ -203,7 +203,7 @@ impl Profile {
         if height <= SHOWS * scatter {
             return None;
         }
-        // Where the profile falls below half its height on either side, between two places of it.
+        // Distance at which the profile falls below half height on one side, interpolated.
         let half = |step: i64| {
             let mut u = middle;
             while at(u + step) >= 0.5 * height {
@@ -221,7 +221,7 @@ impl Profile {
     }
 }
 
-/// The sea under a profile: a line through its means on either side; where one side lies outside the image, the mean of
+/// Sea level under a profile: a line through the means on either side; if one side lies outside the image, the mean of
 /// the other.
 fn level(means: &[f64], at_sea: impl Fn(usize) -> bool) -> Option<Vec<f64>> {
     let half = means.len() / 2;
@@ -308,7 +308,7 @@ mod tests {
 
     /// Bells of standard deviation s are 2.355 s wide at half height; the mean over three pixels adds 2/3 of a square
     /// pixel to their variance and lowers them by the square root of the same ratio. The means have a standard error of
-    /// the speckle, 0.13 at 16 looks, over √(3 × 85): 0.008, for which five are allowed.
+    /// the speckle, 0.13 at 16 looks, over √(3 × 85): 0.008; five times that is allowed.
     #[test]
     fn dark_line_and_streak_are_found_where_they_are() {
         let pattern =
@@ -320,17 +320,18 @@ mod tests {
             let lower = height * std / wider;
             assert!((line.offset - offset).abs() <= 1.0, "{line:?}");
             assert!((line.contrast - lower).abs() < 0.04, "{line:?}");
-            // Errors of 0.04 in height move its half by 0.04 on flanks that fall by some height/(2.4 s) a pixel.
+            // Errors of 0.04 in height move the half-height point by 0.04 on flanks that fall by some height/(2.4 s) a
+            // pixel.
             let allowed = 2.0 * 0.04 * 2.4 * std / lower.abs();
             assert!((line.width - 2.355 * wider).abs() < allowed, "{line:?}");
-            // Amplitude of 16 looks: a variation of 1/√(4 · 16), 1 % more by its next order.
+            // Amplitude of 16 looks has a variation of 1/√(4 · 16), 1 % more with the next order.
             assert!(
                 (line.strength * 0.125 - line.contrast).abs() < 0.03 * line.contrast.abs() + 0.002
             );
         }
     }
 
-    /// Arms at 17 and −19°, one bright and one dark, 1.5 degrees of standard deviation.
+    /// Arms at 17 and −19°, one bright and one dark, with a standard deviation of 1.5 degrees.
     #[test]
     fn arms_are_found_at_their_angles() {
         let pattern = |along: f64, across: f64| {
@@ -339,7 +340,7 @@ mod tests {
         };
         let [left, right] = wake_arms(&image(4, 2, pattern), &AXIS, [85.0, 250.0]);
         let (left, right) = (left.unwrap(), right.unwrap());
-        // 1.5° are 4.4 pixels half-way, which three pixels widen by 2 %.
+        // 1.5° are 4.4 pixels half-way; averaging three pixels widens them by 2 %.
         assert!((right.width / (2.355 * 4.4) - 1.0).abs() < 0.3, "{right:?}");
         assert!(
             (left.offset + 19.0).abs() <= 1.0 && left.contrast < -0.08,
@@ -351,7 +352,7 @@ mod tests {
         );
     }
 
-    /// Sea alone shows nothing, and neither does a slope of its brightness across the image.
+    /// Open sea gives no detection, even with a brightness gradient across the image.
     #[test]
     fn sea_shows_no_wake() {
         let mut shown = 0;
@@ -365,7 +366,7 @@ mod tests {
             let arms = wake_arms(&image, &AXIS, [25.0, 200.0]);
             shown += arms.into_iter().flatten().count();
         }
-        // 120 looks for a line: one in a hundred by chance.
+        // 120 tests for a line: one in a hundred passes by chance.
         assert!(shown <= 4, "{shown}");
     }
 

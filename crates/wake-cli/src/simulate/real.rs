@@ -1,4 +1,4 @@
-//! Real images of a folder, with the axes of their wakes where somebody labelled them.
+//! Real images of a folder, with the axes of their labelled wakes.
 
 use super::figures::ImageFigures;
 use super::profile::WakeAxis;
@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use wake_physics::{Error, Field, Result};
 
-/// `labels.json` of a folder; more keys are allowed.
+/// `labels.json` of a folder; unknown keys are ignored.
 #[derive(Deserialize, Default)]
 struct Labels {
     images: BTreeMap<String, Image>,
@@ -26,7 +26,7 @@ struct Wake {
     confidence: String,
 }
 
-/// Figures of the PNG images of a folder by name, without those whose name ends in `_mask`: their grey is taken as linear in
+/// Figures of the PNG images of a folder by name, without files whose name ends in `_mask`. Grey is taken as linear in
 /// amplitude, and doubtful wakes are left out.
 pub(crate) fn figures(folder: &Path) -> Result<Vec<ImageFigures>> {
     let labels = labels(&folder.join("labels.json"))?;

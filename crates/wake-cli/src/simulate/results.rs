@@ -1,4 +1,4 @@
-//! What is written of one simulation, and what is said of it.
+//! Files and printed summary of one simulation.
 
 use serde_json::{Value, json};
 use std::path::Path;
@@ -8,7 +8,7 @@ use wake_physics::{Simulation, export};
 use super::arguments::{Arguments, Export, GreyName};
 use crate::sheet::Picture;
 
-/// Writes everything but what several scenes share, and gives the report.
+/// Writes the files of one scene and returns its report.
 pub(crate) fn write(
     simulation: &Simulation,
     arguments: &Arguments,
@@ -49,7 +49,7 @@ fn write_fields(simulation: &Simulation, form: Export, out: &Path) -> wake_physi
     Ok(())
 }
 
-/// What is said of a simulation.
+/// Printed summary of a simulation.
 pub(crate) fn summary(simulation: &Simulation, out: &Path) -> String {
     let notes = simulation.plan.notes.iter();
     let notes: String = notes.map(|note| format!("note: {note}\n")).collect();

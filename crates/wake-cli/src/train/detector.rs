@@ -1,4 +1,4 @@
-//! `wake train detector`: the network learns from images made on the fly, or of a data set.
+//! `wake train detector`: trains the network on images made on the fly, or on a data set.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ use super::screen::Screen;
 use crate::exit::Outcome;
 use crate::named;
 
-/// Defaults of the options that all runs have.
+/// Defaults of the options that all trainings have.
 pub(crate) const DEFAULTS: &[(&str, &str)] = &[
     ("steps", "2500"),
     ("batch", "16"),
@@ -19,28 +19,28 @@ pub(crate) const DEFAULTS: &[(&str, &str)] = &[
     ("out", "out/detector"),
 ];
 
-/// Train the detector on images made on the fly, or of a data set.
+/// Train the detector on images made on the fly, or on a data set.
 #[derive(Args)]
 pub(crate) struct Options {
     /// Recipe of the training images
     #[arg(long, default_value = ImageRecipe::Mixed.name(), value_parser = named::recipe())]
     recipe: ImageRecipe,
-    /// Number of different images, repeated in turn; by default all are different
+    /// Number of different images, which repeat in turn [default: no image repeats]
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(16..=1_000_000))]
     distinct: Option<u32>,
-    /// Folder of a data set of `wake dataset` to train on instead of a recipe: 256 x 256 pixels
+    /// Folder of a data set of `wake dataset` with images of 256 x 256 pixels, instead of a recipe
     #[arg(long, value_name = "DIR", conflicts_with_all = ["recipe", "distinct"])]
     data: Option<PathBuf>,
-    /// Folder of labelled images (with labels.json) to train on instead of a recipe
+    /// Folder of labelled images with labels.json, instead of a recipe
     #[arg(long, value_name = "DIR", conflicts_with_all = ["recipe", "distinct", "data"])]
     labelled: Option<PathBuf>,
     /// Labelled image to leave out
     #[arg(long, value_name = "NAME", requires = "labelled")]
     without: Option<String>,
-    /// Number of labelled images: the next ones by name after the one left out
+    /// Number of labelled images, in order of name after the one left out [default: all]
     #[arg(long, value_name = "COUNT", requires = "labelled", value_parser = clap::value_parser!(u32).range(1..))]
     tiles: Option<u32>,
-    /// Initial weights, by default random
+    /// Initial weights [default: random]
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
     #[command(flatten)]
@@ -52,7 +52,7 @@ pub(crate) struct Options {
 }
 
 impl Options {
-    /// The training images; clap refuses more than one of the options.
+    /// The training images; clap rejects conflicting options.
     fn images(&self) -> TrainingImages {
         match (&self.labelled, &self.data) {
             (Some(folder), _) => TrainingImages::Labelled(LabelledImages {
@@ -69,7 +69,7 @@ impl Options {
     }
 }
 
-/// Trains, and writes `detector.safetensors` (averaged weights) and what every run leaves in its folder.
+/// Trains, and writes `detector.safetensors` (EMA weights) and the standard files of a run.
 pub(crate) fn run(options: &Options) -> Outcome<()> {
     let training = DetectorTraining {
         images: options.images(),

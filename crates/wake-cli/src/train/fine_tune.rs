@@ -1,4 +1,4 @@
-//! A Stable Diffusion-layout model learns to draw wakes.
+//! `wake train fine-tune`: fine-tunes a model in Stable Diffusion's layout on wake images.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ use super::options::{Pace, Place, Thrift};
 use super::screen::Screen;
 use crate::exit::{self, Outcome};
 
-/// Defaults of the options that all runs have; batch and rate are the paper's.
+/// Defaults of the options that all trainings have; batch and rate are the paper's.
 pub(crate) const DEFAULTS: &[(&str, &str)] = &[
     ("steps", "1000"),
     ("batch", "16"),
@@ -19,13 +19,13 @@ pub(crate) const DEFAULTS: &[(&str, &str)] = &[
     ("out", "out/fine_tune"),
 ];
 
-/// Bytes of checkpoints below which nobody is warned.
+/// Checkpoint size from which a warning is printed \[bytes\].
 const UNWARNED: u64 = 1 << 30;
 
-/// Fit a model in diffusers layout to simulated pairs: its U-Net, or low-rank changes of it.
+/// Fine-tune a model in diffusers layout on simulated pairs: the whole U-Net, or a low-rank adaptation (LoRA).
 ///
-/// The layout is that of Stable Diffusion's download: `unet`, `vae`, `text_encoder`, `tokenizer` and `scheduler`, each with its
-/// `config.json` and `*.safetensors`; other files are ignored. `docs/paper.md` repeats the paper's experiment with it.
+/// Reads the layout of the Stable Diffusion download: `unet`, `vae`, `text_encoder`, `tokenizer` and `scheduler`, each
+/// with its `config.json` and `*.safetensors`; other files are ignored. `docs/paper.md` repeats the paper's experiment.
 #[derive(Args)]
 pub(crate) struct Options {
     /// Folder of the model in diffusers layout
@@ -34,10 +34,10 @@ pub(crate) struct Options {
     /// Folder of a data set of `wake dataset`
     #[arg(long, value_name = "DIR")]
     data: PathBuf,
-    /// Train a low-rank adaptation of the attention layers of this rank [default: train the whole U-Net]
+    /// Rank of a low-rank adaptation of the attention layers [default: train the whole U-Net]
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     rank: Option<u16>,
-    /// Epochs, instead of --steps; the paper has 4000
+    /// Epochs, instead of --steps; the paper uses 4000
     #[arg(long, conflicts_with = "steps", value_parser = epochs)]
     epochs: Option<f64>,
     /// γ of the min-SNR loss weights [default: equal weights]
@@ -84,7 +84,7 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
     screen.end()
 }
 
-/// Says what the checkpoints take, if that is much.
+/// Prints the disk space that checkpoints take, if it is large.
 fn warn_of_disk(tuning: &FineTuning<'_>) -> Outcome<()> {
     let [checkpoint, model] = tuning.disk()?;
     let keep = tuning.options.keep as u64;

@@ -14,9 +14,9 @@ use options::defaults;
 
 use crate::exit::Outcome;
 
-/// Train the models; a stopped run continues.
+/// Train the models; stopped runs can be continued.
 ///
-/// A folder belongs to one run: other data, another model, seed, rate or batch, and a new beginning, are refused by name.
+/// Each folder belongs to one run. Other data, models, seeds, rates or batches, and new runs in a used folder, are rejected.
 #[derive(Args)]
 pub(crate) struct Arguments {
     #[command(subcommand)]

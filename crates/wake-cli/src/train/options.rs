@@ -1,4 +1,4 @@
-//! Options of every training on the command line.
+//! Options shared by all trainings.
 
 use std::path::PathBuf;
 
@@ -7,33 +7,33 @@ use wake_nn::burn::tensor::Device;
 use wake_nn::device_named;
 use wake_train::{Result, StageOptions};
 
-/// Where a run begins and ends, and what it computes on.
+/// Options for checkpoints, device and output.
 #[derive(Args, Clone)]
 pub(crate) struct Place {
     /// Steps between checkpoints and results
     #[arg(long, visible_alias = "checkpoint-every", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) every: u32,
-    /// Checkpoints to keep
+    /// Number of checkpoints to keep
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..))]
     pub(crate) keep: u16,
-    /// Seed of all random numbers, simulated pairs included
+    /// Seed of all random numbers, including simulated pairs
     #[arg(long, default_value_t = 7)]
     pub(crate) seed: u64,
     /// Continue from the newest checkpoint in --out
     #[arg(long)]
     pub(crate) resume: bool,
-    /// flex, ndarray, wgpu or cuda, where compiled in; a comma between several
+    /// Device: flex, ndarray, wgpu or cuda, if compiled in; separate several with commas
     #[arg(long, default_value = "flex")]
     device: String,
-    /// Folder of the results, made if absent
+    /// Folder for the results, created if absent
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
 }
 
-/// How long a run is, and how fast.
+/// Length and learning rate of a training.
 #[derive(Args, Clone)]
 pub(crate) struct Pace {
-    /// Steps
+    /// Training steps
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) steps: u32,
     /// Examples per batch
@@ -47,18 +47,18 @@ pub(crate) struct Pace {
 /// Options that save memory.
 #[derive(Args, Clone)]
 pub(crate) struct Thrift {
-    /// Gradient accumulation: parts of a batch computed one after the other, to save memory
+    /// Gradient accumulation: number of parts of a batch that are computed one after another, to save memory
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
     accumulation: u16,
-    /// Gradient checkpointing: less memory, slower
+    /// Gradient checkpointing: uses less memory, but is slower
     #[arg(long)]
     checkpointing: bool,
-    /// Compute losses and gradients in bfloat16, where the device can; weights keep 32 bits
+    /// Compute losses and gradients in bfloat16 if the device supports it; weights stay in 32 bits
     #[arg(long)]
     bf16: bool,
 }
 
-/// Defaults of one subcommand, by the names of its options.
+/// Sets the defaults of a subcommand, given as pairs of option name and value.
 pub(crate) fn defaults(
     values: &'static [(&'static str, &'static str)],
 ) -> impl FnMut(Arg) -> Arg + 'static {
@@ -72,13 +72,13 @@ pub(crate) fn defaults(
 }
 
 impl Place {
-    /// The devices, outside autodiff.
+    /// The devices, without autodiff.
     pub(crate) fn devices(&self) -> Result<Vec<Device>> {
         let devices = self.device.split(',').map(device_named);
         Ok(devices.collect::<wake_nn::Result<_>>()?)
     }
 
-    /// Options of a stage with its defaults.
+    /// Stage options with default pace.
     pub(crate) fn stage(&self, thrift: &Thrift) -> Result<StageOptions> {
         Ok(StageOptions {
             grad_accumulation_steps: usize::from(thrift.accumulation),
@@ -93,7 +93,7 @@ impl Place {
         })
     }
 
-    /// Options of a stage at a pace.
+    /// Stage options with the given pace.
     pub(crate) fn paced(&self, pace: &Pace, thrift: &Thrift) -> Result<StageOptions> {
         Ok(StageOptions {
             steps: Some(pace.steps as usize),

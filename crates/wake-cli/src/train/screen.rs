@@ -1,4 +1,4 @@
-//! A training on the screen: a bar for each work, and what is said when a stage is done.
+//! Progress of a training on the screen: a bar for each task, and a line when a stage is done.
 
 use std::io;
 use std::path::{Display, Path};
@@ -12,9 +12,9 @@ use crate::progress;
 
 /// Shows the progress of a training.
 pub(crate) struct Screen<'a> {
-    /// Where the results lie.
+    /// Folder of the results.
     out: &'a Path,
-    /// What is said of a stage, its steps, and the folder.
+    /// Text for a stage, its steps, and the folder.
     line: Line,
     shown: Mutex<Shown>,
 }
@@ -24,7 +24,7 @@ type Line = fn(&str, usize, Display<'_>) -> String;
 struct Shown {
     what: &'static str,
     bar: ProgressBar,
-    /// Whether everything could be said.
+    /// Whether all output succeeded.
     said: io::Result<()>,
 }
 
@@ -48,7 +48,7 @@ impl<'a> Screen<'a> {
         }
     }
 
-    /// What a training calls.
+    /// Callback for a training.
     pub(crate) fn watch(&self) -> impl Fn(Progress) + Sync {
         |told| {
             let mut shown = self.shown.lock().unwrap_or_else(PoisonError::into_inner);
@@ -73,7 +73,7 @@ impl<'a> Screen<'a> {
         }
     }
 
-    /// Whether everything could be said.
+    /// Returns the first output error, if there was one.
     pub(crate) fn end(&self) -> Outcome<()> {
         let mut shown = self.shown.lock().unwrap_or_else(PoisonError::into_inner);
         Ok(std::mem::replace(&mut shown.said, Ok(()))?)

@@ -1,4 +1,4 @@
-//! The sea of real images is learnt, without labels.
+//! `wake train sea`: learns sea texture from real images without labels.
 
 use std::path::PathBuf;
 
@@ -15,14 +15,14 @@ use crate::exit::{self, Outcome};
 use crate::progress;
 use crate::sea_images::{Half, SeaFile, list};
 
-/// Patches in all that are held in memory, unless there are more images.
+/// Most patches held in memory, unless there are more images.
 const PATCHES: usize = 2048;
-/// Seas on a sheet, their rows and columns, and how many stand in a row.
+/// Seas on a sheet, rows and columns of a sea, and seas in a row.
 const SHOWN: u64 = 8;
 const SIDE: usize = 256;
 const ACROSS: usize = 4;
 
-/// Defaults of the options that all runs have.
+/// Defaults of the options that all trainings have.
 pub(crate) const DEFAULTS: &[(&str, &str)] = &[
     ("steps", "1200"),
     ("batch", "16"),
@@ -31,18 +31,19 @@ pub(crate) const DEFAULTS: &[(&str, &str)] = &[
     ("out", "out/sea"),
 ];
 
-/// Train the sea of real radar images that nobody labelled.
+/// Train a model of sea texture on unlabelled radar images.
 ///
-/// Writes `sea.safetensors`, which `wake generate --sea` and `wake dataset --sea` draw scenes on.
+/// Writes `sea.safetensors`, which `wake generate --sea` and `wake dataset --sea` use as the sea of their scenes.
 #[derive(Args)]
 pub(crate) struct Options {
-    /// Folder of radar images of 8 or 16 bits, grey linear in amplitude; pixels marked in `NAME_mask.png` are left out
+    /// Folder of radar images of 8 or 16 bits, with grey linear in amplitude; pixels marked in `NAME_mask.png` are left
+    /// out
     #[arg(long, value_name = "DIR")]
     images: PathBuf,
-    /// Pixel spacing [m], if known: scenes of other pixels are then refused
+    /// Pixel spacing (m), if known; scenes with another spacing are then rejected
     #[arg(long, value_name = "METRES")]
     spacing: Option<f64>,
-    /// Train on one half of every image, to evaluate on the other
+    /// Train on one half of every image, so that the other can be used for evaluation
     #[arg(long, value_enum)]
     half: Option<Half>,
     #[command(flatten)]
@@ -75,7 +76,7 @@ fn name(file: &SeaFile) -> String {
     name.to_string_lossy().into_owned()
 }
 
-/// What is learnt from: the content of all files.
+/// Identity of the training data: the content of all files.
 fn identity(options: &Options, files: &[SeaFile]) -> Outcome<Value> {
     let mut images = Map::new();
     for file in files {
@@ -92,7 +93,7 @@ fn identity(options: &Options, files: &[SeaFile]) -> Outcome<Value> {
     )
 }
 
-/// Patches of all images; one image lies in memory at a time.
+/// Patches of all images; only one image is in memory at a time.
 fn patches(options: &Options, files: &[SeaFile]) -> Outcome<SeaPatches> {
     let each = PATCHES.div_ceil(files.len());
     let bar = progress::bar(files.len() as u64, "images");
@@ -121,7 +122,7 @@ fn patches(options: &Options, files: &[SeaFile]) -> Outcome<SeaPatches> {
     Ok(patches)
 }
 
-/// Seas of the first seeds, as quick-looks show them.
+/// Sheet of seas of the first seeds, as quick-looks.
 fn sheet(texture: &SeaTexture) -> wake_ldm::Result<Picture> {
     let picture = |seed: u64| -> wake_ldm::Result<Picture> {
         let sea = texture.sample(seed, SIDE, SIDE)?;

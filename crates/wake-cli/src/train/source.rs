@@ -1,4 +1,4 @@
-//! Pairs to learn from, on disk or simulated.
+//! Training pairs, on disk or simulated.
 
 use std::path::{Path, PathBuf};
 
@@ -10,22 +10,22 @@ use wake_train::TrainingPairs;
 
 use crate::exit::Outcome;
 
-/// Where pairs come from.
+/// Source of training pairs.
 #[derive(Args, Clone)]
 pub(crate) struct Pairs {
-    /// Folder that `wake dataset` wrote; without it, pairs are simulated first
+    /// Folder of a data set of `wake dataset` [default: simulate pairs first]
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// paper, ranges, satellites, detector or model, or a recipe file: the pairs to simulate where there is no --data
+    /// Recipe of the pairs to simulate without --data: paper, ranges, satellites, detector, model, or a file
     #[arg(long, default_value = "model", conflicts_with = "data")]
     recipe: String,
-    /// Pairs to simulate where there is no --data
+    /// Number of pairs to simulate without --data
     #[arg(long, default_value_t = 2000, value_parser = clap::value_parser!(u64).range(8..=10_000_000))]
     count: u64,
 }
 
 impl Pairs {
-    /// The pairs of --data, or those of --recipe.
+    /// The pairs of --data, or simulated pairs of --recipe.
     pub(crate) fn of(&self, seed: u64) -> Outcome<TrainingPairs> {
         match &self.data {
             Some(path) => Ok(TrainingPairs::folder(folder(path)?)),
@@ -36,7 +36,7 @@ impl Pairs {
         }
     }
 
-    /// The same for a model: of --data every scene must fit it, and what is simulated has its size and grey.
+    /// The pairs for a model: every scene of --data must fit it; simulated pairs get its size and grey.
     pub(crate) fn fitting(&self, config: &WakeModelConfig, seed: u64) -> Outcome<TrainingPairs> {
         let Some(path) = &self.data else {
             let mut recipe = Recipe::named_or_read(&self.recipe)?;
@@ -63,7 +63,7 @@ impl Pairs {
     }
 }
 
-/// A folder with pairs in it.
+/// Opens a data set that is not empty.
 pub(crate) fn folder(path: &Path) -> Outcome<Folder> {
     let folder = Folder::open(path)?;
     match folder.is_empty() {
@@ -72,7 +72,7 @@ pub(crate) fn folder(path: &Path) -> Outcome<Folder> {
     }
 }
 
-/// Refuses pairs that do not fit in memory.
+/// Rejects pairs that do not fit in memory.
 pub(crate) fn check_memory(count: u64, needed: u64) -> Outcome<()> {
     let Some(free) = available_memory().filter(|&free| free < needed) else {
         return Ok(());

@@ -1,4 +1,4 @@
-//! A small model of Stable Diffusion's kind is learnt from nothing, from images and prompts alone.
+//! `wake train text-to-image`: trains a small model of Stable Diffusion's kind from scratch, on images and prompts.
 
 use std::path::PathBuf;
 
@@ -14,7 +14,7 @@ use crate::exit::Outcome;
 /// Recipe of the pairs that are simulated without `--data`.
 const RECIPE: &str = include_str!("text_to_image.toml");
 
-/// Defaults of the options that all runs have.
+/// Defaults of the options that all trainings have.
 pub(crate) const DEFAULTS: &[(&str, &str)] = &[
     ("steps", "5000"),
     ("batch", "16"),
@@ -23,28 +23,28 @@ pub(crate) const DEFAULTS: &[(&str, &str)] = &[
     ("out", "out/text_to_image"),
 ];
 
-/// Train a small model of Stable Diffusion's layout from nothing, on images and prompts alone.
+/// Train a small text-to-image model in Stable Diffusion's layout from scratch, on images and prompts.
 ///
-/// The autoencoder first, then text encoder and U-Net together; `wake generate --weights`, `wake evaluate pipeline --weights` and
-/// `wake train fine-tune --weights` read the model.
+/// Trains the autoencoder first, then text encoder and U-Net together. `wake generate --weights`, `wake evaluate
+/// pipeline --weights` and `wake train fine-tune --weights` read the model.
 #[derive(Args)]
 pub(crate) struct Options {
-    /// Folder of a data set of `wake dataset`; without it, pairs are simulated first
+    /// Folder of a data set of `wake dataset` [default: simulate pairs first]
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Pairs to simulate without --data
+    /// Number of pairs to simulate without --data
     #[arg(long, default_value_t = 4000, value_parser = clap::value_parser!(u64).range(8..=10_000_000))]
     count: u64,
-    /// Steps of the autoencoder; --steps are those of text encoder and U-Net
+    /// Training steps of the autoencoder; --steps is for text encoder and U-Net
     #[arg(long, default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..))]
     autoencoder_steps: u32,
-    /// Stop after this many of --steps, to continue with --resume
+    /// Stop after this many of --steps; continue with --resume
     #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(u32).range(1..))]
     stop_after: Option<u32>,
     /// Pixels per latent pixel along each axis: 4, 8 or 16
     #[arg(long, default_value = "16", value_parser = ["4", "8", "16"])]
     downsampling: String,
-    /// Channels of a latent pixel
+    /// Channels of the latents
     #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u16).range(1..=512))]
     latents: u16,
     #[command(flatten)]

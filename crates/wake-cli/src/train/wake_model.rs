@@ -1,4 +1,4 @@
-//! `wake train wake-model`: the stages of the wake model.
+//! `wake train wake-model`: trains the parts of the wake model.
 
 use std::path::PathBuf;
 
@@ -11,30 +11,30 @@ use super::screen::Screen;
 use super::source::{Pairs, check_memory};
 use crate::exit::Outcome;
 
-/// Defaults of the options that all runs have.
+/// Defaults of the options that all trainings have.
 pub(crate) const DEFAULTS: &[(&str, &str)] = &[("every", "500"), ("out", "out/train")];
 
-/// A part of the wake model, as [`Part`].
+/// Part of the wake model, as [`Part`].
 #[derive(Clone, Copy, ValueEnum)]
 enum Trained {
-    /// Fit the linear autoencoder, in closed form
+    /// Linear autoencoder, fitted in closed form
     Patches,
-    /// Train the prompt parser
+    /// Prompt parser
     Parser,
-    /// Train the mean and the standard deviation of the latents
+    /// Mean and standard deviation of the latents
     Prior,
-    /// Train the flow
+    /// Flow
     Flow,
 }
 
 /// Train the wake model, part by part.
 ///
-/// The parts before the one asked for are trained first, or to their end, where their weights are not in --out yet; so
-/// `flow`, the last, trains the whole model. Writes `config.json`, `PART.safetensors` (averaged weights, 16 bits) and a log
-/// `PART.jsonl` of each part, `explained_variance.json`, `sheet.png`, `run.json`, and `checkpoints/`.
+/// First completes the parts before the selected one if their weights are not in --out, so `flow`, the last, trains the
+/// whole model. Writes `config.json`, `PART.safetensors` (EMA weights, 16 bits) and a log `PART.jsonl` for each part,
+/// `explained_variance.json`, `sheet.png`, `run.json`, and `checkpoints/`.
 #[derive(Args, Clone)]
 pub(crate) struct Options {
-    /// The part to train
+    /// Part to train
     #[arg(value_enum, default_value_t = Trained::Flow)]
     part: Trained,
     #[command(flatten)]
@@ -42,7 +42,7 @@ pub(crate) struct Options {
     /// JSON file with the widths of the model [default: those of the shipped model]
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Steps in all [default: parser 4000, prior 6000, flow 6000]
+    /// Training steps [default: parser 4000, prior 6000, flow 6000]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     steps: Option<u32>,
     /// Examples per batch [default: parser 128, prior 32, flow 8]
@@ -57,7 +57,7 @@ pub(crate) struct Options {
     thrift: Thrift,
 }
 
-/// Trains a part, after those that it needs.
+/// Trains a part after the parts that it needs.
 pub(crate) fn run(options: &Options) -> Outcome<()> {
     let part = match options.part {
         Trained::Patches => Part::Patches,
@@ -76,8 +76,11 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
         Part::Parser => None,
         _ => Some(options.pairs.fitting(&config, options.place.seed)?),
     };
-    if let (Some(pairs), Part::Prior | Part::Flow) = (&pairs, part) {
-        check_memory(pairs.len(), WakeTraining::memory(&config, pairs.len()))?;
+    if let Some(pairs) = &pairs {
+        check_memory(
+            pairs.len(),
+            WakeTraining::memory(&config, pairs.len(), part),
+        )?;
     }
     let out = options.place.out.clone();
     let screen = Screen::new(&out);
@@ -86,7 +89,7 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
     screen.end()
 }
 
-/// The widths of the model: those of --config, else those in --out, else the standard ones for the pairs.
+/// The widths of the model: from --config, else from --out, else the standard ones for the pairs.
 fn config(options: &Options) -> Outcome<WakeModelConfig> {
     let written = options.place.out.join(WakeModelConfig::FILE);
     let file = match &options.config {

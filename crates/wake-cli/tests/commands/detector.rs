@@ -85,6 +85,32 @@ fn bad_images_and_options_are_named() {
         &[text(&image), "--weights", "no/weights"],
         &["no/weights"],
     );
+    for (options, words) in [
+        (
+            ["--geojson", "a.geojson"],
+            ["--geojson", "product", "leave it out"],
+        ),
+        (["--coast", "500"], ["--coast", "product", "leave it out"]),
+        (
+            ["--polarization", "VV"],
+            ["--polarization", "product", "leave it out"],
+        ),
+    ] {
+        let arguments = [&[text(&image)][..], &options].concat();
+        refused_by("detect", &arguments, &words);
+    }
+    for (option, value) in [
+        ("--spacing", "10"),
+        ("--least-score", "0.5"),
+        ("--weights", "file"),
+    ] {
+        let arguments = [text(&image), "--method", "radon", option, value];
+        refused_by(
+            "detect",
+            &arguments,
+            &[option, "network", "leave it out with --method radon"],
+        );
+    }
     refused_by(
         "evaluate",
         &["detector", "--real", "no/tiles"],

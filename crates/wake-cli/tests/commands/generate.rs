@@ -50,6 +50,13 @@ fn wrong_options_are_named() {
     ] {
         refused(&arguments, &words);
     }
+    for (option, value) in [("--overlay", None), ("--sea", Some("a.safetensors"))] {
+        let arguments: Vec<&str> = ["--weights", "tests/fixtures/pipeline_a", option]
+            .into_iter()
+            .chain(value)
+            .collect();
+        refused(&arguments, &[option, "wake model", "leave it out"]);
+    }
     cannot_write("generate", &["--steps", "1"]);
 }
 

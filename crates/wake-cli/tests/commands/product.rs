@@ -147,6 +147,11 @@ fn products_that_cannot_be_are_refused() {
     refused_by("detect", &[TEMPLATE], &["measurement"]);
     refused_by(
         "detect",
+        &[TEMPLATE, "--method", "radon"],
+        &["--method radon", "product"],
+    );
+    refused_by(
+        "detect",
         &[TEMPLATE, "--land", "no/such.geojson"],
         &["no/such.geojson"],
     );

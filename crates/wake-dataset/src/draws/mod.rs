@@ -1,4 +1,4 @@
-//! Scenes whose values are drawn, each on its own, keyed by their path in a scene file.
+//! Random values of scenes, drawn independently and keyed by their path in a scene file.
 
 mod table;
 
@@ -19,7 +19,7 @@ use whole_files::sentence;
 /// Distributions by the path of their value, such as `ship.speed`.
 type Values = BTreeMap<String, Distribution>;
 
-/// Random values of a recipe with their distributions.
+/// Distributions of the random values of a recipe.
 ///
 /// ```toml
 /// count = [0, 5]                                     # ships, each drawn on its own
@@ -33,8 +33,8 @@ type Values = BTreeMap<String, Distribution>;
 /// ]
 /// ```
 ///
-/// A key's values depend on seed, index and key alone, not on which other keys there are. A key of two names, such as
-/// `radar.nesz` and `radar.noise_floor`, is one key.
+/// The values of a key depend on seed, index and key alone, not on other keys. Two names of one key, such as `radar.nesz` and
+/// `radar.noise_floor`, are equivalent.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Draws {
     values: Values,
@@ -43,21 +43,21 @@ pub struct Draws {
 
 /// Number of ships.
 const COUNT: &str = "count";
-/// Grey of the sea's median amplitude, and of no amplitude: see [`Draws::quick_look`].
+/// Grey level of the median amplitude, less that of zero amplitude, and grey level of zero amplitude; see [`Draws::quick_look`].
 const GAIN: &str = "quick_look.gain";
 const OFFSET: &str = "quick_look.offset";
-/// Pixels of the image along a resolution cell, the geometric mean of both axes; 0: the spacing stays as it is.
+/// Image pixels per resolution cell, as the geometric mean of both axes; 0 keeps the spacing.
 const PIXELS: &str = "delivery.pixels";
-/// How the image is passed on: see [`Delivery`]; quality 0: not compressed.
+/// Options of the delivery; see [`Delivery`]. Quality 0: no compression.
 const RESIZE: &str = "delivery.resize";
 const QUALITY: &str = "delivery.quality";
-/// Keys that are none of a scene.
+/// Keys that are not scene keys.
 const OWN: [&str; 6] = [COUNT, GAIN, OFFSET, PIXELS, RESIZE, QUALITY];
 const SENSOR: &str = "radar.sensor";
 const POSITION: &str = "ship.position";
-/// The position that is drawn in the image.
+/// Value of the position for a uniform draw within the image.
 const ANYWHERE: &str = "anywhere";
-/// Keys of a ship that only an echo or the edges of its wake have: a ship that is drawn without has none of them.
+/// Keys of a ship that need its echo or its wake's edges; a ship drawn without these loses the keys.
 const NEEDS: [(&str, &[&str]); 2] = [
     ("echo", &["roll", "roll_period", "scatterers", "halo"]),
     ("edge", &["edge_time", "edge_outflow"]),
@@ -76,7 +76,7 @@ const REFUSED: [(&str, &str); 3] = [
 ];
 
 impl Draws {
-    /// The span of the paper's grid, all directions, one ship size, the ship anywhere, a fifth open sea.
+    /// Ranges of the paper's grid, all directions, one ship size, the ship anywhere, a fifth open sea.
     pub(super) fn ranges() -> Self {
         let even = |path: &str, low, high| (path.to_owned(), Distribution::Even([low, high]));
         let number = |n| Distribution::Fixed(Value::Number(n));
@@ -102,7 +102,7 @@ impl Draws {
         }
     }
 
-    /// These draws with those of a table of a recipe in their place.
+    /// Replaces draws by those of a recipe's table.
     pub(super) fn with(mut self, table: &toml::Table) -> Result<Self> {
         for (key, value) in table {
             if key == "together" {
@@ -114,7 +114,7 @@ impl Draws {
         Ok(self)
     }
 
-    /// What is drawn for scene number `index`: the values of all scenes, and those of one table of `together`.
+    /// Distributions for scene number `index`: those of all scenes, and those of one table of `together`.
     fn chosen(&self, random: NoiseSource, index: u64) -> BTreeMap<&str, &Distribution> {
         let weight = |i: usize| self.together[i].0;
         let place = random.uniform(stream("together"), index);
@@ -129,24 +129,24 @@ impl Draws {
             .collect()
     }
 
-    /// Scene number `index`: `base` with the drawn values in place of its own, not yet rounded.
+    /// Draws scene number `index`: `base` with drawn values, not yet rounded.
     ///
     /// # Errors
     ///
-    /// [`Error::Recipe`] for values that no scene can have together.
+    /// [`Error::Recipe`] for values that cannot be combined in a scene.
     pub(super) fn scene(&self, base: &Scene, random: NoiseSource, index: u64) -> Result<Scene> {
         let chosen = self.chosen(random, index);
         scene(base, &chosen, |path| random.uniform(stream(path), index))
     }
 
-    /// Gain and offset of image number `index` as a quick-look, if they are drawn.
+    /// Gain and offset of image number `index` as a quick-look; `None` if the recipe draws none.
     pub(super) fn quick_look(&self, random: NoiseSource, index: u64) -> Option<[f64; 2]> {
         let chosen = self.chosen(random, index);
         let number = |path: &str| number(&chosen, path, random, index);
         Some([number(GAIN)?, number(OFFSET).unwrap_or(0.0)])
     }
 
-    /// How image number `index` is passed on, if it is resized or compressed.
+    /// Delivery of image number `index`; `None` if it is neither resized nor compressed.
     pub(super) fn delivery(&self, random: NoiseSource, index: u64) -> Option<Delivery> {
         let chosen = self.chosen(random, index);
         let number = |path: &str| number(&chosen, path, random, index);
@@ -160,15 +160,15 @@ impl Draws {
         })
     }
 
-    /// Checks every range against the scene's own, on `base`, and all of them at both ends together.
+    /// Checks each range alone against the ranges of scenes, on `base`, and all ranges together at both ends.
     pub(super) fn validate(&self, base: &Scene) -> Result<()> {
         for case in 0..self.together.len().max(1) {
             let chosen = self.case(case);
-            // What all scenes have is looked at once, with the first table of `together`.
+            // Values of all scenes are checked once, with the first table of `together`.
             let own = |path: &str| case == 0 || self.together[case].1.contains_key(path);
             for (&path, distribution) in chosen.iter().filter(|(path, _)| own(path)) {
                 self.own(path, distribution)?;
-                // Pixels by the resolution need one, which another key may draw.
+                // Pixels per resolution cell need a resolution, which another key may draw.
                 if path == PIXELS {
                     continue;
                 }
@@ -192,7 +192,7 @@ impl Draws {
         Ok(())
     }
 
-    /// Checks what is no key of a scene.
+    /// Checks values of keys that are not scene keys.
     fn own(&self, path: &str, distribution: &Distribution) -> Result<()> {
         let [low, high] = match path {
             GAIN => [1e-3, 1.0],
@@ -225,7 +225,7 @@ impl Draws {
     }
 }
 
-/// Reads a key, or the keys of a table below it.
+/// Reads a key, or the keys of a nested table.
 fn read(values: &mut Values, key: &str, value: &toml::Value) -> Result<()> {
     match value {
         toml::Value::Table(table) if !Distribution::is(table) && !table.is_empty() => {
@@ -268,13 +268,13 @@ fn together(value: &toml::Value) -> Result<Vec<(f64, Values)>> {
         .collect()
 }
 
-/// The stream of random numbers of a key: FNV-1a of its text (Fowler, Noll & Vo), in the upper half of all streams.
+/// Random stream of a key: FNV-1a hash of its text (Fowler, Noll & Vo), in the upper half of all streams.
 fn stream(path: &str) -> u32 {
     let step = |hash: u32, byte: u8| (hash ^ u32::from(byte)).wrapping_mul(16_777_619);
     streams::VALUES | path.bytes().fold(2_166_136_261, step)
 }
 
-/// `base` with values at the places 0…1 of their distributions that `at` says.
+/// `base` with values drawn at quantiles 0…1 of their distributions, given by `at`.
 fn scene(
     base: &Scene,
     drawn: &BTreeMap<&str, &Distribution>,
@@ -335,7 +335,7 @@ fn scene(
         .map_err(|e: toml::de::Error| told(&e.to_string().trim().replace('\n', ", ")))
 }
 
-/// A ship with the values that are drawn of it.
+/// A ship with its drawn values.
 fn ship(
     own: &toml::Value,
     drawn: &BTreeMap<&str, &Distribution>,
@@ -367,7 +367,7 @@ fn ship(
     Ok(ship.into())
 }
 
-/// The spacing \[m\] at which a resolution cell has so many pixels, in steps of 1 cm.
+/// Pixel spacing \[m\] for a number of pixels per resolution cell, in steps of 1 cm.
 fn spacing_of(scene: &Scene, pixels: f64) -> Result<f64> {
     let radar = &scene.radar;
     let range = radar.range_resolution.ok_or_else(|| Error::Recipe {
@@ -377,7 +377,7 @@ fn spacing_of(scene: &Scene, pixels: f64) -> Result<f64> {
     Ok((100.0 * cell / pixels).round().max(10.0) / 100.0)
 }
 
-/// The number that a key has in image number `index`, if the key is drawn and a number.
+/// Number drawn for a key in image number `index`; `None` if the key is not drawn or not a number.
 fn number(
     chosen: &BTreeMap<&str, &Distribution>,
     path: &str,
@@ -391,7 +391,7 @@ fn number(
     }
 }
 
-/// Whether a value of a scene is a whole number.
+/// Whether the value of a key is a whole number.
 fn is_whole(path: &str) -> bool {
     [
         "radar.looks",

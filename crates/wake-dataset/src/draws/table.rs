@@ -1,9 +1,9 @@
-//! Values of scenes in their TOML tables.
+//! Editing of scene values in TOML tables.
 
 use crate::distribution::Value;
 use wake_physics::scene::Ship;
 
-/// Takes away what a sensor sets: all of the radar but what no sensor sets, and the spacing.
+/// Removes the keys that a sensor sets: all keys of the radar except `relaxation_rate`, and the spacing.
 pub(super) fn replace_radar(table: &mut toml::Table) {
     let mut of = |name: &str, keep: &dyn Fn(&str) -> bool| {
         if let Some(table) = table.get_mut(name).and_then(toml::Value::as_table_mut) {
@@ -43,14 +43,14 @@ pub(super) fn tenths(value: f64) -> f64 {
     (10.0 * value).round() / 10.0
 }
 
-/// A coordinate \[m\] between the first pixel's centre and the last one's, in steps of 0.1 m.
+/// Coordinate \[m\] between the centres of the first and the last pixel, in steps of 0.1 m.
 pub(super) fn place(pixels: usize, spacing: f64, at: f64) -> f64 {
     let first = -((pixels / 2) as f64);
     let pixel = first + at * pixels.saturating_sub(1) as f64;
     tenths(spacing * pixel)
 }
 
-/// Another length; beam and draft keep their proportion to it, in steps of 0.1 mm, so that every reader of JSON gets the
+/// Changes the length; beam and draft are scaled in proportion, in steps of 0.1 mm, so that every reader of JSON gets the
 /// same numbers.
 pub(super) fn with_length(ship: &mut toml::Table, length: f64) {
     let number = |ship: &toml::Table, key: &str, default: f64| {

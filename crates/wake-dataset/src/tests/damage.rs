@@ -1,8 +1,8 @@
-//! Damage to a set is refused wherever the set is read, by the name of the file and with the next step.
+//! Damage to a set is refused wherever the set is read, with the name of the file and the next step.
 
 use super::*;
 
-/// A set of quick-looks: the grey of its images follows from the images alone.
+/// A set of quick-looks, whose grey levels depend on each image.
 fn manifest() -> Manifest {
     let quick_look = "draw.quick_look.gain = [0.1, 0.4]";
     let recipe = super::manifest().recipe.with_assignments(&[quick_look]);
@@ -15,7 +15,7 @@ fn whole() -> Tree {
     tree(folder.path())
 }
 
-/// Messages of a run that continues the set, and of a reader of all its pairs.
+/// Results of a run that continues the set, and of reading all its pairs.
 fn told(files: &Tree) -> [Result<(), String>; 2] {
     let folder = TempDir::new().unwrap();
     plant(folder.path(), files);
@@ -31,7 +31,7 @@ fn told(files: &Tree) -> [Result<(), String>; 2] {
     [continued, read()].map(|told| told.map_err(|error| error.to_string()))
 }
 
-/// A pipe in the place of a file is refused: opening it would wait for somebody to write into it.
+/// A pipe in place of a file is refused, because opening it would block until something writes to it.
 #[test]
 fn pipes_are_no_files_of_a_set() {
     let whole = whole();
@@ -76,7 +76,7 @@ fn another_image_over_one_of_the_set_is_refused() {
     assert_eq!(told(&whole), [Ok(()), Ok(())]);
 }
 
-/// Any bit of an image, of a line or of the manifest.
+/// One flipped bit of an image, a line or the manifest is refused.
 #[test]
 fn one_bit_is_enough() {
     let whole = whole();
@@ -89,7 +89,7 @@ fn one_bit_is_enough() {
             let (at, bit) = ((draw(0) * length as f64) as usize, (draw(1) * 8.0) as u32);
             let damaged = changed(&whole, name, |bytes| bytes[at] ^= 1 << bit);
             for (who, told) in ["run", "training"].iter().zip(told(&damaged)) {
-                // Half a line at the end is what a kill leaves: a run makes it again.
+                // An incomplete last line looks like a killed run, so a run makes it again.
                 let cut = name == "metadata.jsonl" && at + 1 == length && *who == "run";
                 let is_refused = told.as_ref().is_err_and(|told| told.contains(name));
                 assert!(
@@ -101,7 +101,7 @@ fn one_bit_is_enough() {
     }
 }
 
-/// Captions, lines of other pairs, labels.
+/// Changed amplitudes, prompts, labels and lines of other pairs are refused.
 #[test]
 fn changed_texts_are_refused() {
     let whole = whole();
@@ -130,7 +130,7 @@ fn changed_texts_are_refused() {
     }
 }
 
-/// A shard that was damaged on its way is not joined.
+/// A damaged shard is not joined.
 #[test]
 fn damaged_shards_are_not_joined() {
     let start = two_shards();
@@ -144,7 +144,7 @@ fn damaged_shards_are_not_joined() {
     }
 }
 
-/// A number of the shard that is another one would count the pairs from elsewhere.
+/// Another shard number would assign the lines to other pairs.
 #[test]
 fn a_changed_note_of_a_shard_is_refused() {
     let folder = TempDir::new().unwrap();
@@ -157,7 +157,7 @@ fn a_changed_note_of_a_shard_is_refused() {
     assert!(told.contains("metadata.jsonl, line 1"), "{told}");
 }
 
-/// An image that comes out otherwise, as of another processor or version, is not put beside a line that is not its own.
+/// An image that comes out differently, as with another processor or version, is refused because it does not match its line.
 #[test]
 fn a_lost_image_that_comes_out_otherwise_is_refused() {
     let folder = TempDir::new().unwrap();
@@ -177,7 +177,7 @@ fn a_lost_image_that_comes_out_otherwise_is_refused() {
     assert_eq!(tree(folder.path()), before);
 }
 
-/// Sets of earlier versions have no checksums.
+/// Sets of earlier versions have no checksums and are refused.
 #[test]
 fn sets_of_earlier_formats_are_refused_in_a_sentence() {
     let folder = TempDir::new().unwrap();

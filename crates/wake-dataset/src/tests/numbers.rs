@@ -1,4 +1,4 @@
-//! Numbers keep their bits through every file of a set.
+//! Numbers keep every bit through the files of a set.
 
 use super::super::annotations::Objects;
 use super::super::metadata::{Row, line, parse};
@@ -13,7 +13,7 @@ fn finite() -> impl Strategy<Value = f64> {
     numbers.prop_filter("finite", |number| number.is_finite())
 }
 
-/// Draws of every form with some numbers; ranges need the lower one first, logarithms and weights positive ones.
+/// Draws of every form with given numbers; ranges need the lower number first, logarithms and weights positive numbers.
 fn draws(numbers: [f64; 6]) -> Draws {
     let [a, b, c, d, e, f] = numbers.map(toml::Value::from);
     let list = |a: &toml::Value, b: &toml::Value| toml::Value::from(vec![a.clone(), b.clone()]);
@@ -61,7 +61,7 @@ fn scene_of([a, b, c]: [f64; 3]) -> Scene {
 }
 
 proptest! {
-    /// Equal texts are equal bits: a number has one shortest text, and −0 has its sign.
+    /// Equal texts imply equal bits: each number has one shortest text, and −0 keeps its sign.
     #[test]
     fn manifests_and_recipes(numbers in prop::array::uniform12(finite())) {
         let manifest = manifest_of(numbers);

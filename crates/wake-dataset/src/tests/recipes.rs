@@ -1,11 +1,11 @@
-//! Sets of every recipe, killed and continued.
+//! Sets of every recipe, interrupted and continued.
 
 use super::*;
 
-/// Pairs of a set: some with a ship, some without.
+/// Number of pairs in a set, some with a ship and some without.
 const PAIRS: u64 = 6;
 
-/// A small set of every built-in recipe, and of `ranges` with what the others vary: all kinds of grey.
+/// Small sets of every built-in recipe, and of `ranges` and `paper` with other kinds of grey.
 fn sets() -> Vec<(String, Manifest)> {
     let quick_look = [
         "draw.quick_look.gain = [0.1, 0.4]",
@@ -35,8 +35,8 @@ fn sets() -> Vec<(String, Manifest)> {
     .collect()
 }
 
-/// Kills a set at several places: the next run makes what is missing and ends with the same bytes, and so does one that finds
-/// everything there.
+/// Interrupts a set at several places and asserts that the next run makes only the missing pairs and ends with the same bytes;
+/// a run of a complete set changes nothing.
 fn check(what: &str, manifest: &Manifest, source: &Simulated) {
     let folder = TempDir::new().unwrap();
     let run = |folder: &Path| -> Result<u64> {
@@ -62,7 +62,7 @@ fn check(what: &str, manifest: &Manifest, source: &Simulated) {
                 .to_string_lossy()
                 .contains(&format!("{:06}", PAIRS - 1))
         });
-        // One whose line is there is lost, too.
+        // The image of a pair with a line is lost, too.
         left.remove(Path::new("images/000000.png"));
         let folder = TempDir::new().unwrap();
         plant(folder.path(), &left);
@@ -79,7 +79,7 @@ fn sets_of_every_recipe_continue() {
     }
 }
 
-/// A manifest and its lines are read as they were written, and shards join to the bytes of the whole.
+/// A manifest and its lines are read back unchanged, and shards join to the bytes of the whole set.
 #[test]
 fn sets_of_every_recipe_are_read_and_joined() {
     for (what, manifest) in sets() {
@@ -109,7 +109,7 @@ fn sets_of_every_recipe_are_read_and_joined() {
     }
 }
 
-/// Makes a shard, loses an image, and makes it again.
+/// Makes a shard, removes an image, and makes it again.
 fn made_in_two(path: &Path, part: &Manifest) {
     made(path, part);
     let first = part.indices().start;

@@ -1,8 +1,8 @@
-//! The messages of `onnx.proto3` that a network needs, with the numbers of their fields.
+//! The messages of `onnx.proto3` that a network needs, with their field numbers.
 
 use prost::Message;
 
-/// A model: a graph, and the version of its operators.
+/// A model: a graph, and the versions of its operators.
 #[derive(Clone, PartialEq, Message)]
 pub(super) struct ModelProto {
     #[prost(int64, tag = "1")]
@@ -19,7 +19,7 @@ pub(super) struct ModelProto {
     pub(super) opset_import: Vec<OperatorSet>,
 }
 
-/// A version of the operators.
+/// A version of an operator set.
 #[derive(Clone, PartialEq, Message)]
 pub(super) struct OperatorSet {
     #[prost(string, tag = "1")]
@@ -102,7 +102,7 @@ pub(super) struct Type {
     pub(super) tensor_type: Option<TensorType>,
 }
 
-/// Kind of numbers and shape of a tensor.
+/// Element type and shape of a tensor.
 #[derive(Clone, PartialEq, Message)]
 pub(super) struct TensorType {
     #[prost(int32, tag = "1")]

@@ -4,11 +4,12 @@
 //! inputs [batch, 2, rows, columns]  ─►  maps [batch, 8, rows/4, columns/4]
 //! ```
 //!
-//! Rows and columns are multiples of [`MULTIPLE`](crate::network::MULTIPLE). docs/onnx.md says how pixels become inputs, and maps wakes.
+//! Rows and columns are multiples of [`MULTIPLE`](crate::network::MULTIPLE). docs/onnx.md describes how to convert pixels to
+//! inputs, and maps to wakes.
 //!
 //! # References
 //!
-//! ONNX 1.12 (IR version 8, operator set 17), `onnx.proto3`: numbers of fields and types.
+//! ONNX 1.12 (IR version 8, operator set 17), `onnx.proto3`: field numbers and types.
 
 mod messages;
 
@@ -24,19 +25,19 @@ use messages::{
     TensorType, Type, ValueInfo,
 };
 
-/// Groups and ε of every normalization, as in `network`.
+/// Number of groups and ε of every normalization, as in `network`.
 const GROUPS: usize = 8;
 const EPSILON: f32 = 1e-5;
 /// Dilations of the blocks at a sixteenth, as in `network`.
 const DILATIONS: [usize; 4] = [1, 2, 4, 2];
-/// Version of the intermediate representation, and of the operators.
+/// Versions of the intermediate representation and of the operator set.
 const IR_VERSION: i64 = 8;
 const OPERATORS: i64 = 17;
-/// Kinds of numbers of a tensor: f32 and i64.
+/// Element types of tensors: f32 and i64.
 const FLOAT: i32 = 1;
 const INT64: i32 = 7;
 
-/// The bytes of an ONNX file with the network's weights in 32 bits.
+/// Returns the bytes of an ONNX file with the network's weights in 32 bits.
 pub fn onnx(network: &Network) -> Vec<u8> {
     let mut weights = Weights::default();
     network.visit(&mut weights);
@@ -56,10 +57,10 @@ pub fn onnx(network: &Network) -> Vec<u8> {
     model.encode_to_vec()
 }
 
-/// Shape and numbers of a tensor.
+/// Shape and values of a tensor.
 type Numbers = (Vec<usize>, Vec<f32>);
 
-/// The parameters of a module by their paths, as in its weight file.
+/// Parameters of a module by path, as in its weight file.
 #[derive(Default)]
 struct Weights {
     path: Vec<String>,
@@ -107,7 +108,7 @@ impl Builder {
         builder
     }
 
-    /// The order of [`Network::forward`].
+    /// Adds all nodes, in the order of [`Network::forward`].
     fn network(&mut self) {
         let fine = self.stem();
         let fine = self.block(&fine, "fine", 1);
@@ -132,7 +133,7 @@ impl Builder {
         self.node("Identity", "maps", &[&maps], Vec::new());
     }
 
-    /// Patches and the 3 × 3 convolution of them as one convolution of 12 × 12 pixels with stride 4.
+    /// The split into patches and their 3 × 3 convolution as one convolution of 12 × 12 pixels with stride 4.
     ///
     /// ```text
     /// w[o, c, 4 i + y, 4 j + x] = stem[o, 16 c + 4 y + x, i, j]
@@ -170,7 +171,7 @@ impl Builder {
         self.node("Add", &format!("{name}.sum"), &[x, &h], Vec::new())
     }
 
-    /// A convolution that keeps the size of the image, or divides it by its stride.
+    /// Adds a convolution that keeps the size of the image, or divides it by its stride.
     fn convolution(&mut self, x: &str, name: &str, stride: usize, dilation: usize) -> String {
         let kernel = self.weights.get(&format!("{name}.weight"));
         let kernel = kernel.and_then(|(shape, _)| shape.last()).copied();
@@ -193,7 +194,7 @@ impl Builder {
         self.node("Conv", name, &[x, &weight, &bias], attributes)
     }
 
-    /// Group normalization and SiLU.
+    /// Adds group normalization and SiLU.
     fn normalized(&mut self, x: &str, name: &str) -> String {
         let shape = self.node("Shape", &format!("{name}.shape"), &[x], Vec::new());
         let inside = [x, "groups"];
@@ -217,7 +218,7 @@ impl Builder {
         self.node("Mul", &format!("{name}.silu"), &[&y, &gate], Vec::new())
     }
 
-    /// Twice as many rows and columns, smoothed.
+    /// Adds an upsampling by two with a convolution.
     fn doubled(&mut self, x: &str, name: &str) -> String {
         let attributes = vec![
             Attribute::text("mode", "nearest"),
@@ -233,7 +234,7 @@ impl Builder {
         self.convolution(&x, &format!("{name}.conv"), 1, 1)
     }
 
-    /// Adds a node with one output of its own name; returns that name.
+    /// Adds a node whose output has the node's name; returns that name.
     fn node(
         &mut self,
         operator: &str,
@@ -251,7 +252,7 @@ impl Builder {
         name.to_owned()
     }
 
-    /// Moves a parameter into the graph, with further axes after its own where they are given: 0 stands for its own.
+    /// Moves a parameter into the graph, with further axes after its own if `axes` is given, whose first number is ignored.
     fn parameter(&mut self, of: &str, kind: &str, axes: Option<[usize; 3]>) -> String {
         let name = format!("{of}.{kind}");
         let (shape, numbers) = self.weights.remove(&name).unwrap_or_default();
@@ -330,7 +331,8 @@ mod tests {
     use std::collections::BTreeSet;
     use wake_nn::conv::{conv3x3, convolve};
 
-    /// Every weight of the network is in the graph once, every input of a node is computed before it, and the last node gives the maps.
+    /// Every weight of the network is in the graph once, every input of a node is computed before the node, and every value but
+    /// the maps is used.
     #[test]
     fn the_graph_is_whole() {
         let network = Network::new(&Device::flex());
@@ -366,7 +368,7 @@ mod tests {
         assert_eq!(known, used);
     }
 
-    /// The wide convolution is that of the patches, whose channels are in the order of `network`.
+    /// The wide convolution equals the one of the patches, whose channels are in the order of `network`.
     #[test]
     fn the_stem_is_one_convolution_of_pixels() {
         let device = Device::flex();

@@ -16,7 +16,7 @@ impl Affine {
         (of(self.x), of(self.y))
     }
 
-    /// The (line, pixel) of coordinates.
+    /// The (line, pixel) at coordinates.
     pub fn pixel_of(&self, x: f64, y: f64) -> (f64, f64) {
         let (dx, dy) = (x - self.x[0], y - self.y[0]);
         let determinant = self.determinant();
@@ -26,12 +26,12 @@ impl Affine {
         )
     }
 
-    /// Area of a pixel, with sign; 0 or not finite where the map has no inverse.
+    /// Signed area of a pixel; 0 or not finite if the map has no inverse.
     pub(crate) fn determinant(&self) -> f64 {
         self.x[1] * self.y[2] - self.x[2] * self.y[1]
     }
 
-    /// The map with the origin moved by pixels and lines.
+    /// The map with its origin moved by `lines` and `pixels`.
     pub(crate) fn shifted(self, lines: f64, pixels: f64) -> Self {
         let (x, y) = self.coordinates(lines, pixels);
         Self {

@@ -1,4 +1,4 @@
-//! Grids of points whose places are known; bilinear in between.
+//! Grids of points with known places, interpolated bilinearly.
 
 use crate::error::{Error, Result};
 use crate::limits::GRID_POINTS;
@@ -11,26 +11,26 @@ pub struct GridPoint {
     pub line: f64,
     /// Pixel; pixel 0 is the centre of the first pixel.
     pub pixel: f64,
-    /// Its place.
+    /// Place of the point.
     pub place: Place,
 }
 
-/// Rectangular grid of points. Places between are bilinear in line and pixel; beyond the last line or pixel of the
-/// grid the outermost cell is continued.
+/// Rectangular grid of points. Places are bilinear in line and pixel; beyond the border of the grid the outermost
+/// cell is extrapolated.
 #[derive(Clone, Debug)]
 pub(crate) struct Grid {
     lines: Vec<f64>,
     pixels: Vec<f64>,
-    /// Row by row; longitudes continue across ±180°.
+    /// Row by row; longitudes are continuous across ±180°.
     places: Vec<Place>,
 }
 
 impl Grid {
-    /// Grid of points in any order.
+    /// Builds a grid from points in any order.
     ///
     /// # Errors
-    /// Fewer than 2 × 2 points, points missing or twice, numbers that mean no place, a grid that ends more than a
-    /// cell before the border of the image. `file` names the file in errors.
+    /// Fewer than 2 × 2 points, missing or duplicate points, numbers that are not a valid place, a grid that ends
+    /// more than a cell before the border of the image. `file` names the file in errors.
     pub(crate) fn new(
         file: &str,
         mut points: Vec<GridPoint>,
@@ -96,7 +96,7 @@ impl Grid {
         })
     }
 
-    /// The place of a pixel.
+    /// Place of a pixel.
     pub(crate) fn place(&self, line: f64, pixel: f64) -> Place {
         let cell = self.cell(line, pixel);
         let optional = |of: fn(&Place) -> Option<f64>| {
@@ -112,7 +112,7 @@ impl Grid {
         }
     }
 
-    /// The (line, pixel) of a place, if it lies in the grid or at most a cell beyond.
+    /// The (line, pixel) of a place, if it lies in the grid or at most one cell beyond.
     pub(crate) fn pixel_of(&self, latitude: f64, longitude: f64) -> Option<(f64, f64)> {
         let longitude = near(longitude, self.places[0].longitude);
         let target = (latitude, longitude);
@@ -133,7 +133,7 @@ impl Grid {
         })
     }
 
-    /// Newton's method from a start, with the derivatives of the cell where it is.
+    /// Newton's method from a start, with the derivatives of the current cell.
     fn search(&self, start: (f64, f64), target: (f64, f64)) -> Option<(f64, f64)> {
         const STEPS: usize = 40;
         let (mut line, mut pixel) = start;
@@ -166,7 +166,7 @@ impl Grid {
         None
     }
 
-    /// Whether a place is inside the box around the grid, with a margin of its size.
+    /// Whether a place is inside the bounding box of the grid, widened by half its size on each side.
     fn may_hold(&self, target: (f64, f64)) -> bool {
         let inside = |of: fn(&Place) -> f64, value: f64| {
             let values = self.places.iter().map(of);
@@ -177,7 +177,7 @@ impl Grid {
         inside(|p| p.latitude, target.0) && inside(|p| p.longitude, target.1)
     }
 
-    /// Whether a place is inside the box around a cell, with a margin of its size.
+    /// Whether a place is inside the bounding box of a cell, widened by its size on each side.
     fn cell_may_hold(&self, i: usize, j: usize, target: (f64, f64)) -> bool {
         let cell = self.cell_at(i, j, self.lines[i], self.pixels[j]);
         let inside = |values: [f64; 4], value: f64| {
@@ -190,7 +190,7 @@ impl Grid {
             && inside(cell.corners.map(|p| p.longitude), target.1)
     }
 
-    /// The cell that a pixel lies in, or the outermost one beside it.
+    /// The cell that contains a pixel, or the nearest cell at the border.
     fn cell(&self, line: f64, pixel: f64) -> Cell {
         let index = |axis: &[f64], x: f64| {
             let after = axis.partition_point(|&at| at <= x);
@@ -216,7 +216,7 @@ impl Grid {
     }
 }
 
-/// Place in a cell: t along lines, u along pixels, both 0 to 1 inside.
+/// Position in a cell: t along lines, u along pixels, both 0 to 1 inside.
 struct Cell {
     t: f64,
     u: f64,
@@ -241,14 +241,14 @@ impl Cell {
     }
 }
 
-/// At most a cell beyond the ends of an axis.
+/// Clamps to at most one cell beyond the ends of an axis.
 fn clamped(x: f64, axis: &[f64]) -> f64 {
     let last = axis.len() - 1;
     let (before, after) = (axis[1] - axis[0], axis[last] - axis[last - 1]);
     x.clamp(axis[0] - before, axis[last] + after)
 }
 
-/// The longitude, plus or minus whole turns, that is nearest to another.
+/// The longitude nearest to another, up to whole turns.
 fn near(longitude: f64, other: f64) -> f64 {
     longitude - ((longitude - other) / 360.0).round() * 360.0
 }
@@ -287,7 +287,7 @@ fn check_point(point: &GridPoint) -> std::result::Result<(), String> {
 mod tests {
     use super::*;
 
-    /// A grid across the antimeridian, turned and slightly curved.
+    /// A grid across the antimeridian, rotated and slightly curved.
     fn points() -> Vec<GridPoint> {
         let mut points = Vec::new();
         for i in 0..5 {

@@ -11,19 +11,19 @@ pub(crate) use grid::Grid;
 use crate::place::Place;
 use crate::projection::Projection;
 
-/// How the places of an image are known.
+/// Source of the places of an image.
 #[derive(Clone, Debug)]
 pub(crate) enum Geolocation {
-    /// From a grid of points.
+    /// A grid of points.
     Grid(Grid),
-    /// From an affine map of projected coordinates.
+    /// An affine map to projected coordinates.
     Affine(Affine, Projection),
     /// No places, with the reason.
     Unknown(String),
 }
 
 impl Geolocation {
-    /// Place of a pixel; `None` beyond the projection, or where no place is known.
+    /// Place of a pixel; `None` beyond the projection, or if places are unknown.
     pub(crate) fn place(&self, line: f64, pixel: f64) -> Option<Place> {
         match self {
             Self::Grid(grid) => Some(grid.place(line, pixel)),
@@ -42,8 +42,8 @@ impl Geolocation {
         }
     }
 
-    /// The (line, pixel) of a place, possibly outside the image; `None` where there is none.
-    /// Longitudes are taken plus or minus whole turns, whichever is nearer to `middle`, the middle pixel of a line.
+    /// The (line, pixel) of a place, possibly outside the image; `None` where there is none. Of the longitudes that
+    /// differ by whole turns, the one whose pixel is nearest to `middle`, the middle pixel of a line, is used.
     pub(crate) fn pixel_of(
         &self,
         latitude: f64,

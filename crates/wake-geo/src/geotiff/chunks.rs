@@ -21,7 +21,7 @@ pub(crate) struct Chunks {
     pub(crate) pixels: usize,
     stored: Encoding,
     compressed: bool,
-    /// Predictor of chunks with LZW, which this crate decodes itself.
+    /// Predictor of LZW chunks, which this crate decodes itself; `None` for other compressions.
     lzw: Option<u16>,
     chunk_lines: usize,
     chunk_pixels: usize,
@@ -31,7 +31,7 @@ pub(crate) struct Chunks {
     decoded: Mutex<Decoded>,
 }
 
-/// Decoded chunks, the latest used last, and the decoder of others.
+/// Decoded chunks, most recently used last, and the decoder for the others.
 struct Decoded {
     decoder: TiffDecoder,
     chunks: Vec<(usize, Chunk)>,
@@ -49,7 +49,7 @@ impl Chunks {
     /// Reads the directory of a TIFF file; `file` names it in errors.
     ///
     /// # Errors
-    /// What is no TIFF file, is truncated, is beyond the limits, or has samples or a compression that are not read.
+    /// A file that is not TIFF, is truncated or beyond the limits, or has unsupported samples or compression.
     pub(crate) fn open(file: &str, source: Arc<dyn ReadAt>) -> Result<Self> {
         let length = source.size();
         let length =
@@ -100,7 +100,7 @@ impl Chunks {
         decoded.decoder.find_tag(tag).ok().flatten()
     }
 
-    /// Checks that all chunks are there and end before the end of the file.
+    /// Checks that all chunks are listed and end within the file.
     fn check_places(&self, length: u64) -> Result<()> {
         let expected = self.chunks_across * self.lines.div_ceil(self.chunk_lines);
         if self.offsets.len() < expected || self.byte_counts.len() < expected {
@@ -140,7 +140,7 @@ impl Chunks {
         Ok(())
     }
 
-    /// Bytes of an uncompressed chunk; the last strip may be shorter than the others.
+    /// Size of an uncompressed chunk \[bytes\]; the last strip may be shorter than the others.
     fn stored_bytes(&self, index: usize) -> u64 {
         let first = index / self.chunks_across * self.chunk_lines;
         let lines = match self.chunks_across == 1 && self.chunk_pixels == self.pixels {
@@ -150,7 +150,7 @@ impl Chunks {
         self.bytes_of(lines)
     }
 
-    /// Bytes of lines of a chunk, without compression.
+    /// Uncompressed size of lines of a chunk \[bytes\].
     fn bytes_of(&self, lines: usize) -> u64 {
         let line = (self.chunk_pixels as u64).saturating_mul(self.stored.pixel_bytes() as u64);
         line.saturating_mul(lines as u64)
@@ -189,7 +189,7 @@ impl Chunks {
         Ok(())
     }
 
-    /// Reads only the bytes of the window; lines as wide as the chunk in one piece.
+    /// Reads only the bytes inside the window; lines as wide as the chunk are read together.
     fn read_stored(
         &self,
         part: &Part,
@@ -240,7 +240,7 @@ impl Chunks {
         Ok(())
     }
 
-    /// A chunk, decoded now or before.
+    /// A decoded chunk, from the cache if possible.
     fn chunk(&self, index: usize) -> Result<Chunk> {
         let mut decoded = self.decoded.lock().unwrap_or_else(PoisonError::into_inner);
         let at = decoded.chunks.iter().position(|(known, _)| *known == index);
@@ -281,7 +281,7 @@ impl Chunks {
         let mut bytes = vec![0; packed as usize];
         let read = self.source.read_exact_at(self.offsets[index], &mut bytes);
         read.map_err(|e| damaged(e.to_string()))?;
-        // Within the limit: the opening checks whole chunks.
+        // Within the limit, which is checked for whole chunks when the file is opened.
         let size = self.stored_bytes(index) as usize;
         let decoded = lzw::decode(&bytes, size, self.chunk_pixels, self.stored, predictor);
         let (bytes, encoding) = decoded.map_err(damaged)?;
@@ -304,7 +304,7 @@ impl Decoded {
         let (pixels, lines) = self.decoder.chunk_data_dimensions(index);
         let samples = (pixels as usize * lines as usize * stored.sample.bytes()).max(1);
         Ok(Chunk {
-            // The decoder leaves out bands that are no colour.
+            // The decoder drops bands that are not colours.
             encoding: Encoding {
                 bands: (layout.len / samples).max(1),
                 big_endian: cfg!(target_endian = "big"),
@@ -316,7 +316,7 @@ impl Decoded {
     }
 }
 
-/// Part of a window in one chunk; lines and pixels count from the chunk's first.
+/// Part of a window in one chunk; lines and pixels count from the first of the chunk.
 struct Part {
     index: usize,
     lines: Range<usize>,
@@ -324,7 +324,7 @@ struct Part {
 }
 
 impl Part {
-    /// A chunk that the file leaves out holds zeros.
+    /// Fills the part with zeros, the content of a chunk that the file omits.
     fn fill(&self, out: &mut [f32], width: usize) {
         for line in 0..self.lines.len() {
             out[line * width..line * width + self.pixels.len()].fill(0.0);

@@ -1,4 +1,4 @@
-//! The directory of a TIFF image: its size, samples and compression.
+//! Directory of a TIFF image: size, samples and compression.
 
 use tiff::decoder::{Decoder, Limits};
 use tiff::tags::{
@@ -12,7 +12,7 @@ use crate::limits::{CHUNK_BYTES, IMAGE_PIXELS, IMAGE_SIDE};
 use crate::read_at::Reader;
 use whole_files::sentence;
 
-/// Most samples of a pixel.
+/// Most samples per pixel.
 const MOST_BANDS: u16 = 64;
 
 /// Command that converts a TIFF file into one that this crate reads.
@@ -30,7 +30,7 @@ pub(super) fn decoder(file: &str, reader: Reader) -> Result<TiffDecoder> {
     Ok(decoder.with_limits(limits))
 }
 
-/// What the directory of the first image says.
+/// Directory of the first image.
 pub(super) struct Tags {
     pub(super) lines: u32,
     pub(super) pixels: u32,
@@ -103,7 +103,7 @@ impl Tags {
                 self.compression
             )));
         }
-        // Readers disagree whether these have a predictor.
+        // Readers disagree on whether these compressions can have a predictor.
         let plain = matches!(
             self.compression,
             CompressionMethod::None | CompressionMethod::PackBits

@@ -1,4 +1,4 @@
-//! Places of a GeoTIFF: its keys, affine map and control points (OGC GeoTIFF 1.1).
+//! Geolocation of a GeoTIFF: keys, affine map and control points (OGC GeoTIFF 1.1).
 
 use tiff::decoder::ifd::Value;
 
@@ -23,7 +23,7 @@ pub(crate) const MODEL_GEOGRAPHIC: u16 = 2;
 pub(crate) const PIXEL_IS_AREA: u16 = 1;
 pub(crate) const PIXEL_IS_POINT: u16 = 2;
 
-/// The places of an image; unknown, with the reason, where the file has none that are understood.
+/// Geolocation of an image; unknown, with the reason, if the file has none that is supported.
 pub(crate) fn geolocation(file: &str, chunks: &Chunks) -> Geolocation {
     match read(file, chunks) {
         Ok(geolocation) => geolocation,
@@ -44,7 +44,7 @@ fn read(file: &str, chunks: &Chunks) -> Result<Geolocation, String> {
     let code = code.ok_or("it has no EPSG code")?;
     let projection = Projection::epsg(code.into());
     let projection = projection.ok_or_else(|| format!("EPSG code {code} is not supported"))?;
-    // Raster coordinates count from the corner of the first pixel, or from its centre.
+    // Raster coordinates count from the corner of the first pixel or from its centre.
     let half = match keys.get(RASTER_TYPE) {
         Some(PIXEL_IS_POINT) => 0.0,
         _ => 0.5,
@@ -118,7 +118,7 @@ fn doubles(chunks: &Chunks, tag: u16) -> Result<Option<Vec<f64>>, String> {
     }
 }
 
-/// Value that stands for missing pixels, as GDAL writes it.
+/// Value that marks missing pixels, as GDAL writes it.
 pub(crate) fn no_data(chunks: &Chunks) -> Option<f32> {
     match chunks.tag(NO_DATA)? {
         Value::Ascii(text) => text
@@ -129,11 +129,11 @@ pub(crate) fn no_data(chunks: &Chunks) -> Option<f32> {
     }
 }
 
-/// Key directory: four numbers a key, after four of a header.
+/// Key directory: a header of four numbers, then four numbers a key.
 struct Keys(Vec<u16>);
 
 impl Keys {
-    /// Value of a key that is stored in the directory itself.
+    /// Value of a key, if it is stored in the directory itself.
     fn get(&self, key: u16) -> Option<u16> {
         let (entries, _) = self.0.get(4..)?.as_chunks::<4>();
         entries

@@ -1,17 +1,17 @@
-//! Strips and tiles with LZW, and the predictors before it.
+//! LZW-compressed strips and tiles, and their predictors.
 //!
-//! The decoder of the crate `tiff` (0.11) reads a tile at the right border piece by piece, and takes the last piece for
-//! an error if the compressed bytes end before it.
+//! The decoder of the crate `tiff` (0.11) reads a tile at the right border piece by piece, and reports an error if
+//! the compressed bytes end before the last piece.
 
 use weezl::BitOrder;
 use weezl::decode::Decoder;
 
 use super::sample::{Encoding, SampleType};
 
-/// Bytes of a chunk of `size` bytes and lines of `pixels` pixels, and how they are encoded.
+/// Decodes a chunk of `size` bytes and lines of `pixels` pixels; returns its bytes and their encoding.
 ///
 /// # Errors
-/// Bytes that are no LZW, or too few; an unknown predictor.
+/// Bytes that are not LZW, or too few; an unknown predictor.
 pub(super) fn decode(
     packed: &[u8],
     size: usize,
@@ -63,7 +63,7 @@ pub(super) fn decode(
     Ok((bytes, encoding))
 }
 
-/// Horizontal predictor: each sample is the difference from that of the pixel before.
+/// Undoes the horizontal predictor: each sample is stored as the difference from the pixel before.
 fn sum(line: &mut [u8], encoding: Encoding) {
     let (pixel, big) = (encoding.pixel_bytes(), encoding.big_endian);
     let add = |line: &mut [u8], at: usize, size: usize| {
@@ -88,7 +88,8 @@ fn sum(line: &mut [u8], encoding: Encoding) {
     }
 }
 
-/// Floating-point predictor: differences of bytes, the highest bytes of all samples first; to big-endian samples.
+/// Undoes the floating-point predictor (byte differences, highest bytes of all samples first); returns big-endian
+/// samples.
 fn join(planes: &mut [u8], line: &mut [u8], bands: usize) {
     for at in bands..planes.len() {
         planes[at] = planes[at].wrapping_add(planes[at - bands]);

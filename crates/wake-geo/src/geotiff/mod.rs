@@ -1,4 +1,4 @@
-//! TIFF files, with or without places, read by windows and written in strips.
+//! TIFF files, with or without places, read in windows and written in strips.
 
 mod chunks;
 mod directory;
@@ -21,7 +21,7 @@ use crate::geolocation::Geolocation;
 use crate::read_at::ReadAt;
 use whole_files::sentence;
 
-/// First image of a TIFF file, of which windows are read. Of several bands the first is read.
+/// First image of a TIFF file, read in windows. Of several bands, the first is read.
 ///
 /// Samples are u8, u16, i16 or f32 in strips or tiles, without compression or with deflate, LZW or `PackBits`, with or
 /// without a predictor, in TIFF or `BigTIFF` of either byte order. Places come from an affine map or from control points
@@ -49,7 +49,7 @@ impl GeoTiff {
     /// Opens a TIFF file and reads its directory, but no pixels.
     ///
     /// # Errors
-    /// A file that cannot be read, is no TIFF, is truncated, is beyond the limits, or uses what is not supported.
+    /// A file that cannot be read, is not TIFF, is truncated or beyond the limits, or uses an unsupported feature.
     pub fn open(path: &Path) -> Result<Self> {
         let file = whole_files::open_regular(path).map_err(|e| Error::io(path, e))?;
         Self::from_source(&sentence(&path.to_string_lossy()), Arc::new(file))
@@ -82,7 +82,7 @@ impl GeoTiff {
         self.sample
     }
 
-    /// Value that stands for missing pixels, where the file names one.
+    /// Value that marks missing pixels, if the file names one.
     pub fn no_data(&self) -> Option<f32> {
         self.no_data
     }
@@ -91,7 +91,7 @@ impl GeoTiff {
         &self.geolocation
     }
 
-    /// Reads samples of a window that lies inside the image, line by line; `out` has its size.
+    /// Reads the samples of a window inside the image, line by line; `out` has the size of the window.
     pub(crate) fn read(
         &self,
         lines: Range<usize>,

@@ -24,11 +24,11 @@ impl SampleType {
     }
 }
 
-/// Bytes of pixels, as they come from a file.
+/// Encoding of pixels in a file.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Encoding {
     pub(crate) sample: SampleType,
-    /// Samples of a pixel; the first is read.
+    /// Samples per pixel; only the first is read.
     pub(crate) bands: usize,
     pub(crate) big_endian: bool,
 }
@@ -39,7 +39,7 @@ impl Encoding {
         self.sample.bytes() * self.bands
     }
 
-    /// First samples of as many pixels as `out` has.
+    /// Decodes the first sample of as many pixels as `out` holds.
     pub(crate) fn decode(self, bytes: &[u8], out: &mut [f32]) {
         match (self.sample, self.big_endian) {
             (SampleType::U8, _) => self.each(bytes, out, |[b]| f32::from(b)),
@@ -60,7 +60,7 @@ impl Encoding {
             value(sample)
         };
         if self.bands == 1 {
-            // Chunks of a constant size become vector instructions.
+            // Chunks of constant size compile to vector instructions.
             for (pixel, out) in bytes.chunks_exact(N).zip(out) {
                 *out = first(pixel);
             }

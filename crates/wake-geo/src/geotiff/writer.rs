@@ -1,4 +1,4 @@
-//! GeoTIFF files, written strip by strip.
+//! Writes GeoTIFF files strip by strip.
 
 use std::io::{BufWriter, Seek, Write};
 use std::ops::Range;
@@ -18,9 +18,9 @@ use crate::limits::{GRID_POINTS, IMAGE_PIXELS, IMAGE_SIDE};
 use crate::projection::is_geographic;
 use whole_files::sentence;
 
-/// Sample of a file that is written.
+/// Sample type of a file to be written.
 pub trait TiffSample: Copy + Default {
-    /// Its type.
+    /// Type of the sample.
     const TYPE: SampleType;
     /// Appends its bytes, little endian.
     fn append(self, bytes: &mut Vec<u8>);
@@ -43,7 +43,7 @@ sample!(u16, U16);
 sample!(i16, I16);
 sample!(f32, F32);
 
-/// Compression of a file that is written.
+/// Compression of a file to be written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Compression {
     /// None.
@@ -53,23 +53,23 @@ pub enum Compression {
     Deflate,
 }
 
-/// Places of a file that is written.
+/// Geolocation of a file to be written.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Placement {
     /// None.
     None,
-    /// An affine map to coordinates of an EPSG code, from the centres of pixels.
+    /// Affine map from pixel centres to coordinates of an EPSG code.
     Affine {
         /// The map.
         affine: Affine,
         /// The EPSG code.
         epsg: u16,
     },
-    /// Control points in latitude and longitude on WGS84, from the centres of pixels (`RasterPixelIsPoint`).
+    /// Control points at pixel centres, in latitude and longitude on WGS84 (`RasterPixelIsPoint`).
     ControlPoints(Vec<GridPoint>),
 }
 
-/// Size and form of a file that is written.
+/// Size and form of a file to be written.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GeoTiffLayout {
     /// Number of lines.
@@ -78,24 +78,24 @@ pub struct GeoTiffLayout {
     pub pixels: usize,
     /// Compression.
     pub compression: Compression,
-    /// Places.
+    /// Geolocation.
     pub placement: Placement,
-    /// Value that stands for missing pixels.
+    /// Value that marks missing pixels.
     pub no_data: Option<f64>,
 }
 
 /// Size of a strip \[bytes\], rounded to whole lines.
 const STRIP_BYTES: usize = 1 << 18;
-/// From this many bytes of pixels a file is a `BigTIFF`: offsets of TIFF have 32 bits, and directories need some.
+/// Files with more bytes of pixels are `BigTIFF`: TIFF offsets have 32 bits, and directories need some space.
 const BIG_TIFF: u64 = (1 << 32) - (1 << 27);
 
-/// Writes a GeoTIFF in strips. `fill` gives the samples of the lines it is asked for, in order; its buffer holds zeros.
+/// Writes a GeoTIFF in strips. `fill` writes the samples of the given lines, in order, into a buffer of zeros.
 ///
-/// The file appears under its name when it is complete. Files above 4 GB become `BigTIFF`.
+/// The file gets its name once it is complete. Files above 4 GB become `BigTIFF`.
 ///
 /// # Errors
-/// A size of 0 or beyond the limits, more than 65,535 control points, a file that cannot be written, or what `fill`
-/// returns.
+/// A size of 0 or beyond the limits, more than 200,000 control points, a file that cannot be written, or any error of
+/// `fill`.
 pub fn write_geotiff<T: TiffSample>(
     path: &Path,
     layout: &GeoTiffLayout,
@@ -121,7 +121,7 @@ pub fn write_geotiff<T: TiffSample>(
     Ok(())
 }
 
-/// Temporary files are for their owner alone; a result may be read by others.
+/// Makes a file readable by others; temporary files are readable only by their owner.
 fn set_permissions(file: &NamedTempFile) -> std::io::Result<()> {
     #[cfg(unix)]
     {
@@ -265,7 +265,7 @@ fn write_places<K: TiffKind, W: Write + Seek>(
         }
         Placement::Affine { affine, .. } => {
             let Affine { x, y } = affine.shifted(-0.5, -0.5);
-            // A map without rotation in the form that every reader knows.
+            // Maps without rotation are written in the form that every reader supports.
             let upright = x[2].abs() + y[1].abs() <= 0.0 && x[1] > 0.0 && y[2] < 0.0;
             if upright {
                 let scale: &[f64] = &[x[1], -y[2], 0.0];

@@ -1,4 +1,4 @@
-//! Annotation of a product: what was imaged when, from where, and where it lies.
+//! Annotation of a product: acquisition, geometry and geolocation.
 
 use super::orbit::Orbit;
 use crate::error::Result;
@@ -31,7 +31,7 @@ pub enum Polarization {
 }
 
 impl Polarization {
-    /// All polarizations, co-polarized first: the order in which one is chosen if none is asked for.
+    /// All polarizations, co-polarized first, in the order of preference if none is requested.
     pub const ALL: [Self; 4] = [Self::VV, Self::HH, Self::VH, Self::HV];
 
     /// Name in capitals, such as `"VV"`.
@@ -44,7 +44,7 @@ impl Polarization {
         }
     }
 
-    /// Polarization of a name in capitals or small letters.
+    /// Polarization with a name, in upper or lower case.
     pub fn from_name(name: &str) -> Option<Self> {
         let is = |known: &Self| known.name().eq_ignore_ascii_case(name);
         Self::ALL.into_iter().find(is)
@@ -66,7 +66,7 @@ pub struct SwathLooks {
     pub azimuth_look_bandwidth: f64,
 }
 
-/// Annotation of one polarization. Line 0 is the first that was acquired; pixel 0 is in near range.
+/// Annotation of one polarization. Line 0 is the first acquired; pixel 0 is in near range.
 #[derive(Clone, Debug, serde::Serialize)]
 #[non_exhaustive]
 pub struct Annotation {
@@ -82,10 +82,10 @@ pub struct Annotation {
     pub platform_heading: f64,
     /// Number of the orbit since launch.
     pub absolute_orbit: u32,
-    /// Time of line 0, zero Doppler.
+    /// Zero-Doppler time of line 0.
     #[serde(serialize_with = "as_text")]
     pub first_line_time: UtcTime,
-    /// Time of the last line, zero Doppler.
+    /// Zero-Doppler time of the last line.
     #[serde(serialize_with = "as_text")]
     pub last_line_time: UtcTime,
     /// Number of lines.
@@ -104,7 +104,7 @@ pub struct Annotation {
     pub radar_frequency: f64,
     /// Incidence angle in the middle of the swath \[degrees\].
     pub incidence_mid_swath: f64,
-    /// Whether the processor has subtracted the thermal noise already.
+    /// Whether the processor has already subtracted the thermal noise.
     pub noise_removed: bool,
     /// Looks and bandwidths of each swath.
     pub looks: Vec<SwathLooks>,
@@ -119,7 +119,7 @@ fn as_text<S: serde::Serializer>(time: &UtcTime, serializer: S) -> Result<S::Ok,
 }
 
 impl Annotation {
-    /// Reads an annotation file; `file` names it in errors. The product type must have been checked.
+    /// Reads an annotation file; `file` names it in errors. The caller must have checked the product type.
     pub(crate) fn read(file: &str, document: &Document) -> Result<Self> {
         let root = document.root();
         let image = root.get("imageAnnotation/imageInformation")?;
@@ -154,7 +154,7 @@ impl Annotation {
         })
     }
 
-    /// Time of a line, zero Doppler.
+    /// Zero-Doppler time of a line.
     pub fn line_time(&self, line: f64) -> UtcTime {
         self.first_line_time.plus_seconds(line * self.line_interval)
     }
@@ -164,15 +164,14 @@ impl Annotation {
         self.orbit.speed(self.line_time(line))
     }
 
-    /// R/V \[s\]: slant range over platform speed. A target moving at u toward the radar is imaged R/V · u away along
-    /// azimuth.
+    /// R/V \[s\]: slant range divided by platform speed. A target that moves toward the radar at u is imaged R/V · u
+    /// away along azimuth.
     pub fn range_to_velocity(&self, line: f64, slant_range_time: f64) -> f64 {
         self.orbit
             .range_to_velocity(self.line_time(line), slant_range_time)
     }
 
-    /// Equivalent number of looks of the product's class, which the spacing identifies; `None` for spacings of no
-    /// class.
+    /// Equivalent number of looks of the product's class, identified by its pixel spacing; `None` for other spacings.
     ///
     /// Source: Sentinel-1 Product Definition (S1-RS-MDA-52-7440), tables of GRD products.
     pub fn equivalent_looks(&self) -> Option<f64> {
@@ -198,7 +197,7 @@ fn pass(text: &str) -> Option<Pass> {
     }
 }
 
-/// Value of an element by a function of its text.
+/// Value of a child element, converted from its text by `read`.
 fn named<T>(node: Node<'_>, name: &str, read: impl Fn(&str) -> Option<T>) -> Result<T> {
     let text = node.get(name)?.text();
     read(text).ok_or_else(|| node.error(format!("{name} is {text:?}, which has no meaning")))

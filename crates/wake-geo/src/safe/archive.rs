@@ -12,7 +12,7 @@ use crate::limits::{ARCHIVE_FILES, XML_BYTES};
 use crate::read_at::{ReadAt, Section};
 use whole_files::sentence;
 
-/// Files of a product, by their paths below the `.SAFE` folder, with `/` between folders.
+/// Files of a product, identified by their paths below the `.SAFE` folder, with `/` between folders.
 #[derive(Debug)]
 pub(crate) struct Archive {
     path: PathBuf,
@@ -23,7 +23,7 @@ pub(crate) struct Archive {
 #[derive(Debug)]
 enum Kind {
     Folder,
-    /// What stands before each name in the archive: `NAME.SAFE/`, or nothing.
+    /// Path before each name in the archive: `NAME.SAFE/`, or nothing.
     Zip {
         prefix: String,
     },
@@ -32,7 +32,7 @@ enum Kind {
 const FOLDERS: [&str; 3] = ["annotation", "annotation/calibration", "measurement"];
 
 impl Archive {
-    /// Lists the files of a folder, or of a `.zip`.
+    /// Lists the files of a folder or a `.zip`.
     pub(crate) fn open(path: &Path) -> Result<Self> {
         match path.is_dir() {
             true => Self::open_folder(path),
@@ -95,7 +95,7 @@ impl Archive {
         &self.path
     }
 
-    /// Names of the files below a folder, such as `annotation`, without those of folders in it.
+    /// Names of the files in a folder, such as `annotation`, without its subfolders.
     pub(crate) fn names_in<'a>(&'a self, folder: &'a str) -> impl Iterator<Item = &'a str> {
         self.names.iter().filter_map(move |name| {
             let name = name.strip_prefix(folder)?.strip_prefix('/')?;
@@ -103,7 +103,7 @@ impl Archive {
         })
     }
 
-    /// Name of the folder that the product was packed from, where a `.zip` has one.
+    /// Name of the `.SAFE` folder; empty for a `.zip` without one.
     pub(crate) fn folder_name(&self) -> &str {
         match &self.kind {
             Kind::Folder => self.path.file_name().and_then(|n| n.to_str()).unwrap_or(""),
@@ -117,7 +117,7 @@ impl Archive {
             .is_ok()
     }
 
-    /// Text of a file of XML, within the limit on its size.
+    /// Text of an XML file, within the size limit.
     pub(crate) fn text(&self, name: &str) -> Result<String> {
         if !self.has(name) {
             return Err(Error::Missing {
@@ -138,7 +138,7 @@ impl Archive {
                 let mut archive = zip_at(&self.path)?;
                 let entry = archive.by_name(&format!("{prefix}{name}"));
                 let entry = entry.map_err(|e| damaged_entry(name, &e))?;
-                // The declared size may lie, so that the bytes are counted as they come.
+                // The declared size may be wrong, so the bytes are counted while reading.
                 let mut entry = entry.take(XML_BYTES + 1);
                 entry
                     .read_to_end(&mut bytes)
@@ -154,7 +154,7 @@ impl Archive {
         })
     }
 
-    /// Opens a file of pixels of at most `most` bytes. A compressed file of a `.zip` is unpacked into a temporary
+    /// Opens a file of pixels of at most `most` bytes. A compressed file in a `.zip` is unpacked into a temporary
     /// file, which the system removes once it is closed.
     pub(crate) fn pixels(&self, name: &str, most: u64) -> Result<Arc<dyn ReadAt>> {
         let Kind::Zip { prefix } = &self.kind else {

@@ -1,4 +1,4 @@
-//! Annotation of a part of a product: every number that depends on lines and pixels moves with the part.
+//! Annotation of a part of a product: all numbers that depend on lines and pixels are adapted to the part.
 
 use std::ops::Range;
 
@@ -8,7 +8,7 @@ use super::tree::Tree;
 use crate::place::Place;
 use crate::time::UtcTime;
 
-/// Lines and pixels of the geolocation grid of a part, as the processor has them.
+/// Lines and pixels of the geolocation grid of a part, as in original products.
 const GRID: [usize; 2] = [10, 21];
 
 /// Part of a product.
@@ -19,7 +19,7 @@ pub(crate) struct Part {
 }
 
 impl Part {
-    /// Changes an annotation file.
+    /// Adapts an annotation file.
     pub(crate) fn cut_annotation(&self, tree: &mut Tree, annotation: &Annotation) {
         let [first, last] = self.times(annotation);
         self.cut_header(tree, annotation);
@@ -51,14 +51,14 @@ impl Part {
         self.cut_swaths(tree);
     }
 
-    /// Changes a calibration file.
+    /// Adapts a calibration file.
     pub(crate) fn cut_calibration(&self, tree: &mut Tree, annotation: &Annotation) {
         self.cut_header(tree, annotation);
         let tables = ["sigmaNought", "betaNought", "gamma", "dn"];
         self.cut_vectors(tree, "calibrationVectorList", &tables, annotation);
     }
 
-    /// Changes a noise file of either form.
+    /// Adapts a noise file of either form.
     pub(crate) fn cut_noise(&self, tree: &mut Tree, annotation: &Annotation) {
         self.cut_header(tree, annotation);
         self.cut_vectors(tree, "noiseVectorList", &["noiseLut"], annotation);
@@ -70,12 +70,12 @@ impl Part {
         }
     }
 
-    /// Times of the first and the last line.
+    /// Times of the first and last line.
     pub(crate) fn times(&self, annotation: &Annotation) -> [UtcTime; 2] {
         [self.lines.start, self.lines.end - 1].map(|line| annotation.line_time(line as f64))
     }
 
-    /// Places of the corners, around the part.
+    /// Places of the four corners, in order around the part.
     pub(crate) fn corners(&self, annotation: &Annotation) -> [Place; 4] {
         let [top, bottom] = [self.lines.start, self.lines.end - 1].map(|line| line as f64);
         let [left, right] = [self.pixels.start, self.pixels.end - 1].map(|pixel| pixel as f64);
@@ -126,7 +126,7 @@ impl Part {
         places.map(point).collect()
     }
 
-    /// Polynomials between slant and ground range: ground range counts from the first pixel.
+    /// Adapts the polynomials between slant and ground range: ground range is counted from the first pixel.
     fn cut_conversions(&self, tree: &mut Tree, annotation: &Annotation) {
         let list = "coordinateConversion/coordinateConversionList";
         let shift = self.pixels.start as f64 * annotation.range_spacing;
@@ -171,7 +171,7 @@ impl Part {
         tree.set_children("swathMerging/swathMergeList", merges);
     }
 
-    /// A block with first and last line and pixel, cut to the part; `None` if it lies outside.
+    /// Cuts a block with first and last line and pixel to the part; `None` if it lies outside.
     fn cut_bounds(&self, mut block: Tree) -> Option<Tree> {
         for (range, [first, last]) in [
             (&self.lines, ["firstAzimuthLine", "lastAzimuthLine"]),
@@ -188,7 +188,7 @@ impl Part {
         Some(block)
     }
 
-    /// An azimuth profile of the noise.
+    /// Cuts an azimuth profile of the noise.
     fn cut_block(&self, block: Tree) -> Option<Tree> {
         let mut block = self.cut_bounds(block)?;
         let (lines, factors) = (block.numbers("line")?, block.numbers("noiseAzimuthLut")?);
@@ -203,7 +203,7 @@ impl Part {
         Some(block)
     }
 
-    /// Vectors along range at a few lines: bilinear tables, so that the part has the same values.
+    /// Cuts vectors along range at a few lines, so that the bilinear table has the same values in the part.
     fn cut_vectors(&self, tree: &mut Tree, list: &str, tables: &[&str], annotation: &Annotation) {
         let Some(vectors) = tree.find(list) else {
             return;
@@ -252,7 +252,7 @@ impl Part {
     }
 }
 
-/// Sine of the elevation angle over that of the incidence angle: radius of the Earth over that of the orbit.
+/// Sine of the elevation angle over sine of the incidence angle, which is the Earth's radius over the orbit's.
 fn elevation_ratio(grid: &Tree) -> f64 {
     let ratio = |point: &Tree| {
         let sine = |name| Some(point.number(name)?.to_radians().sin());
@@ -266,7 +266,7 @@ fn middle(range: &Range<usize>) -> f64 {
     0.5 * (range.start + range.end - 1) as f64
 }
 
-/// Places of a table inside a range, and both ends of the range.
+/// Positions of a table inside a range, and both ends of the range.
 fn clipped(places: &[f64], range: &Range<usize>) -> Vec<f64> {
     let [first, last] = [range.start as f64, (range.end - 1) as f64];
     let inside = places.iter().copied().filter(|&at| at > first && at < last);

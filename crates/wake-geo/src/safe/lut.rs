@@ -1,4 +1,4 @@
-//! Look-up tables given by vectors along range at a few lines: calibration and range noise.
+//! Look-up tables given as vectors along range at a few lines: calibration and range noise.
 
 use std::ops::Range;
 
@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::limits::VECTORS;
 use crate::xml::Node;
 
-/// One vector: values at a few pixels of one line.
+/// A vector: values at a few pixels of one line.
 #[derive(Clone, Debug)]
 pub(crate) struct Vector {
     pub(crate) line: f64,
@@ -20,7 +20,7 @@ impl Vector {
         interpolate(&self.pixels, &self.values, pixel)
     }
 
-    /// Values at consecutive pixels, in one sweep.
+    /// Fills `out` with the values at consecutive pixels, in one sweep.
     fn fill(&self, pixels: Range<usize>, out: &mut [f32]) {
         let mut cell = self.pixels.partition_point(|&p| p <= pixels.start as f64);
         for (pixel, out) in pixels.zip(out) {
@@ -56,13 +56,13 @@ fn between(a: (f64, f64), b: (f64, f64), x: f64) -> f64 {
     a.1 * (1.0 - t) + b.1 * t
 }
 
-/// Table over the image: bilinear between vectors, constant beyond the first and the last.
+/// Table over the image: bilinear between vectors, constant beyond the first and last.
 #[derive(Clone, Debug)]
 pub(crate) struct Lut {
     vectors: Vec<Vector>,
 }
 
-/// Size of the image that a table is for, and the range of its values.
+/// Size of the image that a table covers, and the allowed range of its values.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Extent {
     pub(crate) lines: usize,
@@ -72,10 +72,10 @@ pub(crate) struct Extent {
 }
 
 impl Lut {
-    /// Reads the vectors `item` of the list `list`, whose values are in the element `values`.
+    /// Reads the vectors `item` in the list `list`; each has its values in the element `values`.
     ///
     /// # Errors
-    /// No vector, lines or pixels that do not increase or lie more than one image away, lists of unequal length,
+    /// No vector, lines or pixels that do not increase or lie more than one image size away, lists of unequal length,
     /// values outside the range of `extent`, vectors that leave much of the image uncovered.
     pub(crate) fn read(list: Node<'_>, item: &str, values: &str, extent: Extent) -> Result<Self> {
         let mut vectors: Vec<Vector> = Vec::new();
@@ -95,7 +95,7 @@ impl Lut {
         let (Some(first), Some(last)) = (vectors.first(), vectors.last()) else {
             return Err(list.error(format!("{:?} has no {item:?}", list.name())));
         };
-        // Vectors lie about a second apart; a table that ends further from the border is cut off.
+        // Vectors are about a second apart; a table that ends farther from the border was cut off.
         let steps = vectors.windows(2).map(|pair| pair[1].line - pair[0].line);
         let step = steps.fold(0.0, f64::max).max(1.0);
         let uncovered = first.line.max(extent.lines as f64 - 1.0 - last.line);
@@ -108,7 +108,7 @@ impl Lut {
         Ok(Self { vectors })
     }
 
-    /// The vectors around a line, and the weight of the second.
+    /// The vectors before and after a line, and the weight of the second.
     fn around(&self, line: f64) -> (usize, usize, f64) {
         let lines = &self.vectors;
         match lines.partition_point(|v| v.line <= line) {
@@ -122,13 +122,13 @@ impl Lut {
         }
     }
 
-    /// Value at a place of the image.
+    /// Value at a position in the image.
     pub(crate) fn at(&self, line: f64, pixel: f64) -> f64 {
         let (a, b, t) = self.around(line);
         self.vectors[a].at(pixel) * (1.0 - t) + self.vectors[b].at(pixel) * t
     }
 
-    /// The table at consecutive pixels, for one line after the other.
+    /// The table at consecutive pixels, for use line by line.
     pub(crate) fn rows(&self, pixels: Range<usize>) -> Rows<'_> {
         Rows {
             lut: self,
@@ -178,7 +178,7 @@ fn read_vector(node: Node<'_>, values: &str, extent: Extent) -> Result<Vector> {
     })
 }
 
-/// Rows of a table: the two vectors around a line are resampled once and kept for the lines that follow.
+/// Rows of a table: the two vectors around a line are resampled once and reused for the following lines.
 #[derive(Debug)]
 pub(crate) struct Rows<'a> {
     lut: &'a Lut,

@@ -32,10 +32,10 @@ use whole_files::sentence;
 
 /// One polarization of a Sentinel-1 Level-1 GRD product.
 ///
-/// σ⁰ = (DN² − noise) / A². A is bilinear between the vectors of `sigmaNought`; the noise is bilinear between its range
-/// vectors, times the factor of its azimuth block, linear along azimuth. Tables are constant beyond their first and
-/// last line or pixel. A pixel with DN² below the noise has σ⁰ = 0 and is counted; DN = 0 is no data. Where the
-/// processor has removed the noise already, the noise is 0.
+/// σ⁰ = (DN² − noise) / A². A is bilinear between the vectors of `sigmaNought`; the noise is bilinear between its
+/// range vectors, times the factor of its azimuth block, which is linear along azimuth. Tables are constant beyond
+/// their first and last line or pixel. A pixel with DN² below the noise has σ⁰ = 0 and is counted; DN = 0 is no data.
+/// If the processor has already removed the noise, the noise is 0.
 #[derive(Debug)]
 pub struct Sentinel1 {
     archive: Archive,
@@ -58,18 +58,19 @@ pub struct PixelCalibration {
 }
 
 impl PixelCalibration {
-    /// σ⁰ (linear) of a digital number: (DN² − noise) / A², and 0 for a number below the noise.
+    /// σ⁰ (linear) of a digital number: (DN² − noise) / A², and 0 if DN² is below the noise.
     pub fn sigma_nought(self, digital_number: f64) -> f64 {
         sigma_nought(digital_number, self.noise, self.sigma_nought_lut)
     }
 }
 
 impl Sentinel1 {
-    /// Opens a product: a `.SAFE` folder, or a `.zip` of one. Without a polarization the first of VV, HH, VH and HV that
-    /// the product has is opened. The measurement is opened when it is first read.
+    /// Opens a product: a `.SAFE` folder, or a `.zip` of one. Without a polarization, opens the first that the
+    /// product has of VV, HH, VH and HV. The measurement is opened when it is first read.
     ///
     /// # Errors
-    /// Files that are missing, damaged or beyond the limits; a product of another type; a polarization that is not there.
+    /// Files that are missing, damaged or beyond the limits; a product of another type; a polarization that the
+    /// product lacks.
     pub fn open(path: &Path, polarization: Option<Polarization>) -> Result<Self> {
         let archive = Archive::open(path)?;
         let stems = stems(&archive)?;
@@ -108,12 +109,12 @@ impl Sentinel1 {
         &self.polarizations
     }
 
-    /// Name that annotation and measurement files share, such as `s1a-iw-grd-vv-20210119t031653-…-001`.
+    /// Name shared by annotation and measurement files, such as `s1a-iw-grd-vv-20210119t031653-…-001`.
     pub fn stem(&self) -> &str {
         &self.stem
     }
 
-    /// Whether the product has pixels of this polarization; some have annotation alone.
+    /// Whether the product has pixels of this polarization; some products have only annotation.
     pub fn has_measurement(&self) -> bool {
         self.archive.has(&self.measurement_name())
     }
@@ -138,7 +139,7 @@ impl Sentinel1 {
         noise / (sigma_nought_lut * sigma_nought_lut)
     }
 
-    /// Reads digital numbers of a window inside the image, line by line; `out` has its size.
+    /// Reads the digital numbers of a window inside the image, line by line; `out` has the size of the window.
     pub(crate) fn digital_numbers(
         &self,
         lines: Range<usize>,
@@ -159,7 +160,7 @@ impl Sentinel1 {
         measurement.read(lines, pixels, out)
     }
 
-    /// σ⁰ of a window inside the image; `window` has its size.
+    /// Reads σ⁰ of a window inside the image; `window` has the right size.
     pub(crate) fn read_window(
         &self,
         lines: Range<usize>,
@@ -207,7 +208,7 @@ impl Sentinel1 {
     }
 }
 
-/// Polarizations and file names of the annotations of a GRD product, co-polarized first.
+/// Polarizations and file names of a GRD product's annotations, co-polarized first.
 fn stems(archive: &Archive) -> Result<Vec<(Polarization, String)>> {
     let mut found = Vec::new();
     let mut other = None;

@@ -1,4 +1,4 @@
-//! Thermal noise of a product: power in DN², range times azimuth.
+//! Thermal noise of a product: power \[DN²\] as a range table times an azimuth profile.
 //!
 //! Until March 2018 (IPF 2.8 and older) a file has one list, `noiseVectorList`, along range. Since then it has
 //! `noiseRangeVectorList`, and `noiseAzimuthVectorList` with a factor along azimuth for each block of a swath.
@@ -10,17 +10,17 @@ use crate::error::Result;
 use crate::limits::VECTORS;
 use crate::xml::{Document, Node};
 
-/// Largest noise power that is believed \[DN²\]; products of 16 bits have at most 2³².
+/// Largest noise power that is accepted \[DN²\]; products of 16 bits have at most 2³².
 const LARGEST: f64 = 1e12;
 
-/// Thermal noise at each place: bilinear range table times the azimuth factor of the block.
+/// Thermal noise at each position: bilinear range table times the azimuth factor of the block.
 #[derive(Clone, Debug)]
 pub(crate) struct Noise {
     pub(crate) range: Lut,
     pub(crate) azimuth: Vec<AzimuthBlock>,
 }
 
-/// Block of the image with one azimuth profile; the bounds are part of the block.
+/// Block of the image with one azimuth profile; the bounds are inclusive.
 #[derive(Clone, Debug)]
 pub(crate) struct AzimuthBlock {
     first_line: usize,
@@ -43,7 +43,7 @@ impl AzimuthBlock {
 }
 
 impl Noise {
-    /// Reads a noise file of either form, of an image of that many lines and pixels.
+    /// Reads a noise file of either form, for an image with the given lines and pixels.
     pub(crate) fn read(document: &Document, lines: usize, pixels: usize) -> Result<Self> {
         let root = document.root();
         let extent = Extent {
@@ -75,7 +75,7 @@ impl Noise {
         Ok(Self { range, azimuth })
     }
 
-    /// Azimuth factor at a place; 1 where no block lies. The first of overlapping blocks counts.
+    /// Azimuth factor at a position; 1 outside all blocks. Of overlapping blocks, the first is used.
     pub(crate) fn azimuth_factor(&self, line: f64, pixel: f64) -> f64 {
         let (row, column) = (
             line.round().max(0.0) as usize,
@@ -90,7 +90,7 @@ impl Noise {
             .map_or(1.0, |block| block.at(line))
     }
 
-    /// Noise power at a place \[DN²\].
+    /// Noise power at a position \[DN²\].
     pub(crate) fn at(&self, line: f64, pixel: f64) -> f64 {
         self.range.at(line, pixel) * self.azimuth_factor(line, pixel)
     }
@@ -114,7 +114,7 @@ impl Noise {
         }
     }
 
-    /// Whether blocks of a line may share pixels: they do not in products, where pixels increase from block to block.
+    /// Whether blocks of a line may share pixels. In products they do not: pixels increase from block to block.
     fn blocks_overlap(&self, line: usize) -> bool {
         let mut end = None;
         let mut on_line = self.azimuth.iter().filter(|block| block.has_line(line));

@@ -8,7 +8,7 @@ use crate::xml::Node;
 /// Speed of light in vacuum \[m/s\].
 const LIGHT: f64 = 299_792_458.0;
 
-/// Speeds of the platform at the times of its state vectors, in the Earth-fixed frame.
+/// Platform speeds at the times of the state vectors, in the Earth-fixed frame.
 #[derive(Clone, Debug)]
 pub(crate) struct Orbit {
     states: Vec<(UtcTime, f64)>,
@@ -65,7 +65,7 @@ impl Orbit {
         }
     }
 
-    /// Slant range over platform speed \[s\], at a time and a two-way slant range time \[s\].
+    /// Slant range divided by platform speed \[s\], at a time and a two-way slant range time \[s\].
     pub(crate) fn range_to_velocity(&self, time: UtcTime, slant_range_time: f64) -> f64 {
         0.5 * LIGHT * slant_range_time / self.speed(time)
     }

@@ -1,4 +1,4 @@
-//! Digital numbers to σ⁰, row by row.
+//! Conversion of digital numbers to σ⁰, row by row.
 
 use std::ops::Range;
 
@@ -6,7 +6,7 @@ use super::calibration::Calibration;
 use super::lut::Rows;
 use super::noise::Noise;
 
-/// Counts of pixels that have no σ⁰ of their own.
+/// Numbers of pixels without data and below the noise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Counts {
     pub(crate) no_data: usize,
@@ -18,7 +18,7 @@ pub(crate) fn sigma_nought(number: f64, noise: f64, calibration: f64) -> f64 {
     ((number * number - noise) / (calibration * calibration)).max(0.0)
 }
 
-/// Rows of digital numbers to rows of σ⁰, in place, for the lines of a window in order.
+/// Converts rows of digital numbers to σ⁰ in place, for the lines of a window in order.
 pub(crate) struct Calibrator<'a> {
     pixels: Range<usize>,
     calibration: Rows<'a>,
@@ -40,7 +40,7 @@ impl<'a> Calibrator<'a> {
         }
     }
 
-    /// One row. A digital number of 0 is no data and becomes NaN.
+    /// Converts one row. A digital number of 0 is no data and becomes NaN.
     pub(crate) fn apply(&mut self, line: usize, row: &mut [f32]) -> Counts {
         if let Some((noise, rows)) = &mut self.noise {
             let (a, b, t) = rows.at(line);

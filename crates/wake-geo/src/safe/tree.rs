@@ -1,4 +1,4 @@
-//! XML files as trees that can be changed and written again.
+//! XML files as trees that can be changed and written back.
 
 use std::fmt::Write as _;
 
@@ -9,12 +9,12 @@ use crate::error::{Error, Result};
 use crate::xml::Document;
 use whole_files::sentence;
 
-/// Element of an XML file with all that stands in it, as it is escaped in the file. Comments are not kept.
+/// Element of an XML file with its content, escaped as in the file. Comments are not kept.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tree {
     /// Name with its prefix.
     pub(crate) name: String,
-    /// Attributes as they stand behind the name.
+    /// Attributes as written after the name.
     attributes: String,
     /// Text, if the element has no children.
     pub(crate) text: String,
@@ -33,7 +33,7 @@ impl Tree {
 
     /// Parses the text of a file within the limits; `file` names the file in errors.
     pub(crate) fn parse(file: &str, text: &str) -> Result<Self> {
-        // Refuses whatever is damaged or beyond the limits.
+        // Rejects files that are damaged or exceed a limit.
         Document::parse(file, text)?;
         let mut reader = Reader::from_str(text);
         let mut open = vec![Self::default()];
@@ -87,7 +87,7 @@ impl Tree {
         value.split('"').next()
     }
 
-    /// Replaces the value of an attribute that the element has.
+    /// Replaces the value of an existing attribute.
     pub(crate) fn set_attribute(&mut self, name: &str, value: impl std::fmt::Display) {
         if let Some(old) = self.attribute(name) {
             let old = format!("{name}=\"{old}\"");
@@ -103,38 +103,38 @@ impl Tree {
         })
     }
 
-    /// First element at the path `a/b/c` below this one, to be changed.
+    /// First element at the path `a/b/c` below this one, mutable.
     pub(crate) fn find_mut(&mut self, path: &str) -> Option<&mut Self> {
         path.split('/').try_fold(self, |tree, name| {
             tree.children.iter_mut().find(|c| c.name == name)
         })
     }
 
-    /// All elements below this one, in the order of the file.
+    /// Applies `change` to this element and all below it, in the order of the file.
     pub(crate) fn for_each(&mut self, change: &mut impl FnMut(&mut Self)) {
         change(self);
         self.children.iter_mut().for_each(|c| c.for_each(change));
     }
 
-    /// Replaces the text at a path, if there is such an element.
+    /// Replaces the text of the element at a path, if there is one.
     pub(crate) fn set(&mut self, path: &str, value: impl std::fmt::Display) {
         if let Some(found) = self.find_mut(path) {
             found.text = value.to_string();
         }
     }
 
-    /// Number at a path.
+    /// Number in the element at a path.
     pub(crate) fn number(&self, path: &str) -> Option<f64> {
         self.find(path)?.text.trim().parse().ok()
     }
 
-    /// List of numbers at a path.
+    /// List of numbers in the element at a path.
     pub(crate) fn numbers(&self, path: &str) -> Option<Vec<f64>> {
         let words = self.find(path)?.text.split_ascii_whitespace();
         words.map(|word| word.parse().ok()).collect()
     }
 
-    /// Replaces the list of numbers at a path, and its attribute `count`.
+    /// Replaces the list of numbers at a path and its attribute `count`.
     pub(crate) fn set_numbers(&mut self, path: &str, values: impl Iterator<Item = String>) {
         if let Some(found) = self.find_mut(path) {
             let values: Vec<String> = values.collect();
@@ -143,7 +143,7 @@ impl Tree {
         }
     }
 
-    /// Replaces the children of the element at a path, and its attribute `count`.
+    /// Replaces the children of the element at a path and its attribute `count`.
     pub(crate) fn set_children(&mut self, path: &str, children: Vec<Self>) {
         if let Some(found) = self.find_mut(path) {
             found.set_attribute("count", children.len());
@@ -151,7 +151,7 @@ impl Tree {
         }
     }
 
-    /// The text of a file with this root.
+    /// Text of a file with this root.
     pub(crate) fn to_text(&self) -> String {
         let mut text = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n".to_owned();
         self.write(&mut text, 0);

@@ -1,4 +1,4 @@
-//! Products with the annotation of another, and digital numbers of one's own.
+//! Writes products from another product's annotation and new digital numbers.
 
 use std::fs;
 use std::ops::Range;
@@ -12,24 +12,24 @@ use crate::geolocation::GridPoint;
 use crate::geotiff::{Compression, GeoTiffLayout, Placement, write_geotiff};
 use crate::window::check_part;
 
-/// Fewest lines and pixels of a part: the geolocation grid has 21 pixels a line, and tables a value every 40.
+/// Fewest lines and pixels of a part: the geolocation grid has 21 pixels a line, and tables have a value every 40.
 const SMALLEST: usize = 64;
 
 impl Sentinel1 {
-    /// Writes a product of one polarization into a folder: the annotation of this one, cut to some lines and pixels, and
-    /// your digital numbers. Returns the path of the new `.SAFE` folder.
+    /// Writes a product of one polarization into the folder `out`: this product's annotation, cut to the given lines
+    /// and pixels, with your digital numbers. Returns the path of the new `.SAFE` folder.
     ///
-    /// Times, sizes, geolocation, coordinate conversion, swath bounds, calibration and noise are those of the part; what
-    /// describes the acquisition (orbit, attitude, Doppler, antenna) stays whole. The manifest has the new files alone, without
-    /// checksums. The folder appears under its name when it is complete.
+    /// Times, sizes, geolocation, coordinate conversion, swath bounds, calibration and noise are adapted to the part;
+    /// the description of the acquisition (orbit, attitude, Doppler, antenna) stays complete. The manifest lists only
+    /// the new files, without checksums. The folder gets its name once it is complete.
     ///
-    /// - `fill`: gives the digital numbers of the lines it is asked for, in order, counted from the first line of the part;
-    ///   0 is no data
+    /// - `fill`: writes the digital numbers of the given lines, called in order, counted from the first line of the
+    ///   part; 0 is no data
     ///
     /// # Errors
     ///
-    /// A part that leaves the image, or of fewer than 64 lines or pixels; a folder of that name; files that cannot be
-    /// written; what `fill` returns.
+    /// A part that leaves the image or has fewer than 64 lines or pixels; an existing folder of that name; files that
+    /// cannot be written; any error of `fill`.
     pub fn write_part(
         &self,
         out: &Path,
@@ -111,7 +111,7 @@ impl Sentinel1 {
         Ok(())
     }
 
-    /// The points of the geolocation grid of the part.
+    /// Points of the geolocation grid of the part.
     fn control_points(&self, part: &Part) -> Vec<GridPoint> {
         let along = |range: &Range<usize>, count: usize| -> Vec<usize> {
             let last = range.len() - 1;
@@ -132,7 +132,7 @@ impl Sentinel1 {
             .collect()
     }
 
-    /// Name of a part without its ending: the parts of the old name with the new times.
+    /// Name of a part without its ending: the product's name with the new times.
     fn part_name(&self, part: &Part) -> String {
         let [first, last] = part
             .times(self.annotation())
@@ -154,7 +154,7 @@ impl Sentinel1 {
         }
     }
 
-    /// Name of the files of a part without their ending.
+    /// Name of the files of a part, without ending.
     fn part_stem(&self, part: &Part) -> String {
         let [first, last] = part
             .times(self.annotation())
@@ -168,7 +168,7 @@ impl Sentinel1 {
         words.join("-")
     }
 
-    /// The manifest with the files that are there, and times and footprint of the part.
+    /// Adapts the manifest: only existing files, times and footprint of the part.
     fn cut_manifest(&self, tree: &mut Tree, part: &Part, folder: &Path, stem: &str) {
         let [first, last] = part.times(self.annotation());
         let corners = part.corners(self.annotation());
@@ -215,13 +215,13 @@ impl Sentinel1 {
     }
 }
 
-/// A time as names of products have it: `20210119T031653`.
+/// A time in the format of product names: `20210119T031653`.
 fn compact(time: &str) -> String {
     let digits = time.split('.').next().unwrap_or(time);
     digits.replace(['-', ':'], "")
 }
 
-/// Temporary folders are for their owner alone; a result may be read by others.
+/// Makes a folder readable by others; temporary folders are readable only by their owner.
 fn readable(folder: &Path) -> Result<()> {
     #[cfg(unix)]
     {

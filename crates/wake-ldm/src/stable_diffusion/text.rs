@@ -1,4 +1,4 @@
-//! The CLIP text transformer: from token ids to what the U-Net attends to.
+//! CLIP text transformer, from token ids to the embeddings that condition the U-Net.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ use wake_nn::linear::linear;
 use wake_nn::weights::{Layout, load};
 use wake_nn::{Error, Result, check_range};
 
-/// Widths and options of a [`ClipText`]; the defaults are those of Stable Diffusion v1.4.
+/// Widths and options of a [`ClipText`], by default those of Stable Diffusion v1.4.
 #[derive(Config, Debug, PartialEq)]
 pub struct ClipTextConfig {
     /// Number of tokens in the vocabulary.
@@ -28,13 +28,13 @@ pub struct ClipTextConfig {
     /// Channels between the two matrices of the feed-forward layer.
     #[config(default = 3072)]
     pub intermediate_size: usize,
-    /// Transformer layers.
+    /// Number of transformer layers.
     #[config(default = 12)]
     pub layers: usize,
-    /// Attention heads.
+    /// Number of attention heads.
     #[config(default = 12)]
     pub heads: usize,
-    /// The longest prompt in tokens, both marks included.
+    /// Longest prompt in tokens, including start and end marks.
     #[config(default = 77)]
     pub max_tokens: usize,
     /// Activation of the feed-forward layer.
@@ -43,8 +43,7 @@ pub struct ClipTextConfig {
     /// ε of the normalisations.
     #[config(default = 1e-5)]
     pub norm_epsilon: f64,
-    /// Id of the end mark. Files written before 2023 say 2, whatever the vocabulary: the mark is
-    /// then the largest id of the prompt.
+    /// Id of the end mark. Files written before 2023 give 2 for any vocabulary; the mark is then the largest id of the prompt.
     #[config(default = 2)]
     pub end_token: i64,
 }
@@ -56,16 +55,15 @@ impl ClipTextConfig {
     ///
     /// # Errors
     ///
-    /// [`Error::Unsupported`] for an option that would change the numbers and that we lack, and what
-    /// [`validate`](Self::validate) finds; [`Error::Io`], [`Error::Json`] for a bad file.
+    /// [`Error::Unsupported`] for an option that would change the result and is not implemented, and the errors of
+    /// [`validate`](Self::validate); [`Error::Io`], [`Error::Json`] for a bad file.
     pub fn read(path: &Path) -> Result<Self> {
         Self::from_json(&whole_files::read_text(path)?, path)
     }
 
-    /// Reads the text of a `config.json`; `path` only serves messages.
+    /// Reads the text of a `config.json`; `path` is used only in messages.
     ///
-    /// transformers writes many options that have nothing to do with this model; only those that
-    /// shape a CLIP text transformer are looked at.
+    /// transformers writes many options that do not concern this model; only those that shape a CLIP text transformer are read.
     ///
     /// # Errors
     ///
@@ -93,7 +91,7 @@ impl ClipTextConfig {
         Ok(config)
     }
 
-    /// The `config.json` that transformers reads as this model.
+    /// `config.json` from which transformers reads this model.
     pub fn to_json(&self) -> Value {
         json!({
             "architectures": [COMPONENT],
@@ -121,7 +119,7 @@ impl ClipTextConfig {
     ///
     /// # Errors
     ///
-    /// [`Error::OutOfRange`] for a number outside its range, [`Error::InvalidOption`] where the
+    /// [`Error::OutOfRange`] for a number outside its range, [`Error::InvalidOption`] if the
     /// heads do not divide the width.
     pub fn validate(&self) -> Result<()> {
         let counts = [
@@ -146,7 +144,7 @@ impl ClipTextConfig {
         })
     }
 
-    /// A text transformer with random weights; they are drawn when they are first used.
+    /// Makes a text transformer with random weights, which are drawn on first use.
     ///
     /// # Panics
     ///
@@ -184,14 +182,14 @@ impl ClipTextConfig {
 /// Embedding of a prompt.
 #[derive(Debug, Clone)]
 pub struct ClipTextOutput {
-    /// All tokens after the last layer and its normalisation, `[batch, tokens, hidden_size]`: what
-    /// the U-Net of Stable Diffusion v1 attends to.
+    /// All tokens after the last layer and its normalisation, `[batch, tokens, hidden_size]`, to which the
+    /// U-Net of Stable Diffusion v1 attends.
     pub last_hidden_state: Tensor<3>,
     /// The token at the end mark, `[batch, hidden_size]`: one vector for the whole prompt.
     pub pooled: Tensor<2>,
 }
 
-/// A transformer in which every token sees itself and those before it.
+/// Transformer in which every token attends to itself and to earlier tokens.
 ///
 /// # References
 ///
@@ -212,7 +210,7 @@ impl ClipText {
     ///
     /// # Errors
     ///
-    /// As [`load`], and what [`ClipTextConfig::read`] finds.
+    /// The errors of [`load`] and of [`ClipTextConfig::read`].
     pub fn from_folder(folder: &Path, device: &Device) -> Result<Self> {
         let config = ClipTextConfig::read(&folder.join("config.json"))?;
         load(config.init(device), Layout::ClipText, folder)
@@ -223,7 +221,7 @@ impl ClipText {
         &self.config
     }
 
-    /// Numbers per token.
+    /// Channels of a token.
     pub fn width(&self) -> usize {
         self.config.hidden_size
     }
@@ -248,7 +246,7 @@ impl ClipText {
         }
     }
 
-    /// The tokens alone, without the one for the whole prompt, whose place is looked for on the host.
+    /// Embeddings of the tokens, without the pooled one, whose position must be found on the host.
     ///
     /// # Shapes
     ///
@@ -264,7 +262,7 @@ impl ClipText {
         self.final_layer_norm.forward(tokens)
     }
 
-    /// The tokens as they enter each layer, and as they leave the last, before its normalisation.
+    /// Tokens at the input of each layer and at the output of the last, before its normalisation.
     ///
     /// # Shapes
     ///
@@ -292,7 +290,7 @@ impl ClipText {
         self.token_embedding.forward(ids) + positions.unsqueeze::<3>()
     }
 
-    /// Takes each prompt's token at the end mark; ids are read back to the host for that.
+    /// Returns each prompt's token at the end mark, for which ids are read back to the host.
     fn pool(&self, ids: Tensor<2, Int>, states: &Tensor<3>) -> Tensor<2> {
         let [batch, tokens] = ids.dims();
         let ids: Vec<i64> = ids.into_data().iter::<i64>().collect();
@@ -310,7 +308,7 @@ impl ClipText {
     }
 }
 
-/// Position of the end mark: the first one, or the first largest id under the old convention.
+/// Position of the first end mark, or of the first largest id under the old convention.
 fn end_of(prompt: &[i64], end_token: i64) -> usize {
     let mark = if end_token == 2 {
         prompt.iter().copied().max()

@@ -1,4 +1,4 @@
-//! The levels of the U-Net on the way down, in the middle and on the way up.
+//! Levels of the U-Net: down, middle and up.
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
@@ -8,7 +8,7 @@ use wake_nn::resample::{Downsample, Upsample};
 use wake_nn::resnet::{ResnetBlock, ResnetShape};
 use wake_nn::transformer::{Transformer2d, TransformerShape};
 
-/// Residual blocks (each with its transformer, if any), then half the size.
+/// Residual blocks (each with its transformer, if any), then downsampling by two.
 #[derive(Module, Debug)]
 pub(super) struct DownBlock {
     resnets: Vec<ResnetBlock>,
@@ -40,7 +40,7 @@ impl DownBlock {
     }
 }
 
-/// A residual block, a transformer, a residual block.
+/// A residual block, a transformer and another residual block.
 #[derive(Module, Debug)]
 pub(super) struct MidBlock {
     resnets: Vec<ResnetBlock>,
@@ -63,7 +63,7 @@ impl MidBlock {
     }
 }
 
-/// Residual blocks that also see the images from the way down, then twice the size.
+/// Residual blocks with skip connections from the way down, then upsampling by two.
 #[derive(Module, Debug)]
 pub(super) struct UpBlock {
     resnets: Vec<ResnetBlock>,
@@ -104,7 +104,7 @@ fn concatenate(x: Tensor<4>, skip: Vec<Tensor<4>>) -> Tensor<4> {
     Tensor::cat(parts, 1)
 }
 
-/// The widths of all levels, from which the blocks are built.
+/// Widths of all levels, from which the blocks are built.
 pub(super) struct Levels<'a> {
     config: &'a UNetConfig,
     /// Channels of the embedded step: four times the first width.
@@ -209,7 +209,7 @@ impl<'a> Levels<'a> {
     }
 }
 
-/// Channels that the residual blocks of one level see on the way up: the image from below (or from
+/// Input channels of the residual blocks of one level on the way up: the image from below (or from
 /// the block before) and the skipped image.
 fn up_inputs(widths: &[usize], level: usize, layers: usize) -> Vec<usize> {
     let width = widths[level];

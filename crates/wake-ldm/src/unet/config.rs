@@ -1,4 +1,4 @@
-//! What shapes a U-Net, and how it is written in a `config.json`.
+//! Configuration of a U-Net, and its `config.json`.
 
 use std::path::Path;
 
@@ -8,12 +8,12 @@ use serde_json::{Value, json};
 use crate::options::Options;
 use wake_nn::{Error, Result, check_range};
 
-/// Widths and options of a [`UNet`](super::UNet); the defaults are those of Stable Diffusion v1.4.
+/// Widths and options of a [`UNet`](super::UNet), by default those of Stable Diffusion v1.4.
 ///
-/// Levels are counted from the full size of the latent image downwards; each but the last halves it.
+/// Levels are counted from the full size of the latent image down; each level but the last halves it.
 #[derive(Config, Debug, PartialEq)]
 pub struct UNetConfig {
-    /// Channels of the noisy image, and of any maps laid over it.
+    /// Channels of the noisy image, plus those of any maps concatenated to it.
     #[config(default = 4)]
     pub in_channels: usize,
     /// Channels of the prediction.
@@ -28,7 +28,7 @@ pub struct UNetConfig {
     /// Whether a level attends to the prompt on the way up, **lowest level first**.
     #[config(default = "vec![false, true, true, true]")]
     pub up_attention: Vec<bool>,
-    /// Residual blocks per level on the way down; one more on the way up.
+    /// Residual blocks per level on the way down; there is one more on the way up.
     #[config(default = 2)]
     pub layers_per_block: usize,
     /// Transformer blocks per attention.
@@ -37,10 +37,10 @@ pub struct UNetConfig {
     /// Attention heads of each level.
     #[config(default = "vec![8, 8, 8, 8]")]
     pub heads: Vec<usize>,
-    /// Channels of the prompt's tokens; `None` for a model whose attention mixes pixels alone.
+    /// Channels of the prompt's tokens; `None` for a model with self-attention alone.
     #[config(default = "Some(768)")]
     pub cross_attention_dim: Option<usize>,
-    /// Length of a vector of numbers that conditions the image beside the prompt, if any.
+    /// Length of a vector of numbers that conditions the image in addition to the prompt, if any.
     pub condition_channels: Option<usize>,
     /// Groups of every group normalisation.
     #[config(default = 32)]
@@ -67,10 +67,10 @@ const DOWN: [&str; 2] = ["DownBlock2D", "CrossAttnDownBlock2D"];
 const UP: [&str; 2] = ["UpBlock2D", "CrossAttnUpBlock2D"];
 
 impl UNetConfig {
-    /// The small model for wake images: 32 × 32 latents, three levels, attention at 16 and 8 only.
+    /// Configuration of the small model for wake images: 32 × 32 latents, three levels, attention at 16 and 8 only.
     ///
-    /// `latent_channels` of noise, `context_channels` of the prompt's tokens, and a vector of
-    /// `condition_channels` numbers, each if any.
+    /// It has `latent_channels` of noise and, if given, `context_channels` of the prompt's tokens and a vector of
+    /// `condition_channels` numbers.
     pub fn small(
         latent_channels: usize,
         context_channels: Option<usize>,
@@ -94,13 +94,13 @@ impl UNetConfig {
     ///
     /// # Errors
     ///
-    /// [`Error::Unsupported`] for an option that would change the numbers and that we lack, and what
-    /// [`validate`](Self::validate) finds; [`Error::Io`], [`Error::Json`] for a bad file.
+    /// [`Error::Unsupported`] for an option that would change the result and is not implemented, and the errors of
+    /// [`validate`](Self::validate); [`Error::Io`], [`Error::Json`] for a bad file.
     pub fn read(path: &Path) -> Result<Self> {
         Self::from_json(&whole_files::read_text(path)?, path)
     }
 
-    /// Reads the text of a `config.json`; `path` only serves messages.
+    /// Reads the text of a `config.json`; `path` is used only in messages.
     ///
     /// # Errors
     ///
@@ -140,7 +140,9 @@ impl UNetConfig {
         })
     }
 
-    /// The `config.json` that diffusers reads as this model; a `cross_attention_dim` of 0, which diffusers lacks, for none.
+    /// `config.json` from which diffusers reads this model.
+    ///
+    /// Without a context it has a `cross_attention_dim` of 0, which diffusers does not support.
     pub fn to_json(&self) -> Value {
         let names = |flags: &[bool], names: [&str; 2]| -> Vec<String> {
             flags
@@ -244,14 +246,14 @@ impl UNetConfig {
         }
     }
 
-    /// Whether any attention runs at a level; the last level has the middle block's.
+    /// Whether a level has any attention; the last level has that of the middle block.
     fn attends(&self, level: usize) -> bool {
         let levels = self.block_out_channels.len();
         level + 1 == levels || self.down_attention[level] || self.up_attention[levels - 1 - level]
     }
 }
 
-/// An error unless `divisor` divides `width`.
+/// Returns an error unless `divisor` divides `width`.
 fn divides(name: &str, divisor: usize, width: usize) -> Result<()> {
     if divisor > 0 && width.is_multiple_of(divisor) {
         return Ok(());
@@ -263,7 +265,7 @@ fn divides(name: &str, divisor: usize, width: usize) -> Result<()> {
     })
 }
 
-/// Which blocks of a list attend to the prompt.
+/// Whether each block of a list attends to the prompt.
 fn attention_flags(
     options: &Options,
     key: &str,
@@ -278,14 +280,14 @@ fn attention_flags(
     kinds.iter().map(flag).collect()
 }
 
-/// The length of the condition vector, which diffusers calls a projected class embedding.
+/// Takes the length of the condition vector, which diffusers calls a projected class embedding.
 fn take_condition(options: &mut Options) -> Result<Option<usize>> {
     let channels = options.usize("projection_class_embeddings_input_dim", 0)?;
     options.only("class_embed_type", &["projection"])?;
     Ok((channels > 0).then_some(channels))
 }
 
-/// Requires the one value that we implement of every option that would change the numbers.
+/// Requires the implemented value of every option that would change the result.
 fn refuse_other_architectures(options: &mut Options) -> Result<()> {
     options.only("_class_name", &[COMPONENT])?;
     options.only("act_fn", &["silu", "swish"])?;
@@ -303,13 +305,13 @@ fn refuse_other_architectures(options: &mut Options) -> Result<()> {
     ] {
         options.only(key, &[value])?;
     }
-    // Attention here is always computed in at least f32, which is what upcasting asks for; the
-    // embedding heads only matter together with an embedding type, which is refused.
+    // Attention is always computed in at least f32 here, as upcasting requires; the embedding heads
+    // matter only with an embedding type, which is rejected.
     options.ignore(&["upcast_attention", "addition_embed_type_num_heads"]);
     Ok(())
 }
 
-/// Writes 0.0 as the 0 that diffusers writes.
+/// Writes whole numbers without a fraction, as diffusers does.
 fn whole(number: f64) -> Value {
     if number.fract().abs() > 0.0 {
         json!(number)
@@ -327,7 +329,7 @@ mod tests {
     use super::*;
     use crate::unet::UNetInput;
 
-    /// Without a context there are no weights for one, the file says so, and none is needed.
+    /// A model without a context has no weights for it, needs none as input, and keeps this in its file.
     #[test]
     fn a_model_may_attend_to_pixels_alone() {
         let attending = UNetConfig::small(2, Some(8), Some(3))
@@ -344,7 +346,7 @@ mod tests {
         let device = Device::flex();
         let unet = config.init(&device);
         let fewer = attending.init(&device).num_params() - unet.num_params();
-        // Four transformers, in each a norm, maps of 16 and 8 channels to 16, and one out with its bias.
+        // Four transformers, each with a norm, maps from 16 and 8 channels to 16, and an output map with bias.
         assert_eq!(fewer, 4 * (2 * 16 + 16 * 16 + 2 * 8 * 16 + 16 * 16 + 16));
         let out = unet.forward(UNetInput {
             sample: Tensor::ones([1, 2, 8, 8], &device),

@@ -1,4 +1,4 @@
-//! The conditional U-Net: from a noisy image, a step and a prompt to what the noise was.
+//! Conditional U-Net, which predicts the noise from a noisy image, a step and a prompt.
 
 mod blocks;
 mod config;
@@ -27,10 +27,10 @@ pub struct UNetInput {
     pub sample: Tensor<4>,
     /// The step of each image, `[batch]`; fractions are allowed.
     pub timesteps: Tensor<1>,
-    /// The prompt's tokens, `[batch, tokens, cross_attention_dim]`; a model that attends to none takes `None`, and does not
-    /// look at any.
+    /// The prompt's tokens, `[batch, tokens, cross_attention_dim]`; `None` for a model without cross-attention, which
+    /// ignores a context.
     pub context: Option<Tensor<3>>,
-    /// Numbers that condition the image beside the prompt, `[batch, condition_channels]`; `None`
+    /// Numbers that condition the image in addition to the prompt, `[batch, condition_channels]`; `None`
     /// leaves the model unconditioned by them.
     pub condition: Option<Tensor<2>>,
 }
@@ -63,7 +63,7 @@ pub struct UNet {
 }
 
 impl UNetConfig {
-    /// A U-Net with random weights; they are drawn when they are first used.
+    /// Makes a U-Net with random weights, which are drawn on first use.
     ///
     /// # Panics
     ///
@@ -96,7 +96,7 @@ impl UNet {
     ///
     /// # Errors
     ///
-    /// As [`load`], and what [`UNetConfig::read`] finds.
+    /// The errors of [`load`] and of [`UNetConfig::read`].
     pub fn from_folder(folder: &Path, device: &Device) -> Result<Self> {
         let config = UNetConfig::read(&folder.join("config.json"))?;
         load(config.init(device), Layout::Diffusers, folder)
@@ -112,18 +112,19 @@ impl UNet {
         self.config.condition_channels
     }
 
-    /// Predicts the noise (or velocity, or clean image, as the model was trained to).
+    /// Predicts the noise, velocity or clean image, whichever the model was trained for.
     ///
     /// Inputs are cast to the precision of the weights, the result to that of the sample.
     ///
     /// # Shapes
     ///
-    /// See [`UNetInput`]; result `[batch, out_channels, rows, columns]`. Rows and columns are free;
+    /// See [`UNetInput`]; result `[batch, out_channels, rows, columns]`. Rows and columns are arbitrary;
     /// powers of two times 2^(levels − 1) avoid resizing on the way up.
     ///
     /// # Panics
     ///
-    /// When the shapes do not fit, a condition is given to a model that has none, or no context to one that attends to it.
+    /// When the shapes do not fit, when a condition is given to a model without one, or when a model with cross-attention gets
+    /// no context.
     pub fn forward(&self, input: UNetInput) -> Tensor<4> {
         let dtype = self.conv_in.weight.val().dtype();
         let sample_dtype = input.sample.dtype();
@@ -149,7 +150,7 @@ impl UNet {
         )
     }
 
-    /// The embedding of step and condition that every residual block sees.
+    /// Embedding of step and condition, an input of every residual block.
     fn embed_step(&self, timesteps: Tensor<1>, condition: Option<Tensor<2>>) -> Tensor<2> {
         let dtype = self.conv_in.weight.val().dtype();
         let waves = sinusoidal_embedding(

@@ -1,8 +1,8 @@
-//! Vector instructions of this machine.
+//! Vector instructions of the machine.
 
 use pulp::Arch;
 
-/// The widest that this machine has; tests may hold it to AVX2.
+/// Returns the widest vector instructions of this machine; tests may limit them to AVX2.
 pub(super) fn arch() -> Arch {
     #[cfg(all(test, target_arch = "x86_64"))]
     if narrow::is_held()
@@ -23,7 +23,7 @@ pub(super) mod narrow {
         HELD.load(Ordering::Relaxed)
     }
 
-    /// Holds all kernels to AVX2, or frees them again.
+    /// Limits all kernels to AVX2, or lifts the limit.
     pub(in crate::kernels) fn hold(held: bool) {
         HELD.store(held, Ordering::Relaxed);
     }

@@ -1,6 +1,6 @@
-//! Columns of a matrix, as parts that several cores write.
+//! Columns of a matrix in blocks that several cores can write.
 
-/// Cuts every row of a matrix at the same columns: for each block of columns, its part of each row.
+/// Splits every row of a matrix at the same columns; returns each block of columns as its parts of all rows.
 pub(super) fn columns(matrix: &mut [f32], row: usize, block: usize) -> Vec<Vec<&mut [f32]>> {
     let rows = matrix.len() / row;
     let mut blocks: Vec<Vec<&mut [f32]>> = (0..row.div_ceil(block))

@@ -1,4 +1,4 @@
-//! Group normalisation with or without SiLU after it, and its gradients, in one pass over memory each.
+//! Group normalisation, optionally followed by SiLU, and its gradients, in one pass over memory each.
 
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::silu::sigmoid;
 use super::sum::{product_sum, sum};
 
-/// Sizes of a normalisation, and what it does.
+/// Sizes and options of a normalisation.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Shape {
     /// Channels of an image.
@@ -17,7 +17,7 @@ pub(crate) struct Shape {
     pub(crate) pixels: usize,
     /// ε under the root.
     pub(crate) epsilon: f32,
-    /// Whether SiLU follows.
+    /// Whether SiLU is applied afterwards.
     pub(crate) silu: bool,
 }
 
@@ -30,7 +30,7 @@ impl Shape {
         self.per_group() * self.pixels
     }
 
-    /// The values of a parameter that belong to a group, counted over the batch.
+    /// Values of a parameter for one group; groups are counted over the batch.
     fn of_group<'a>(&self, parameter: &'a [f32], group: usize) -> &'a [f32] {
         &parameter[group % self.groups * self.per_group()..][..self.per_group()]
     }
@@ -66,7 +66,7 @@ pub(crate) fn normalize(x: &[f32], parameters: [&[f32]; 2], shape: &Shape) -> (V
     (y, moments)
 }
 
-/// One group of one image, to be normalised.
+/// One group of one image in the forward pass.
 struct Forward<'a> {
     x: &'a [f32],
     parameters: [&'a [f32]; 2],
@@ -98,7 +98,7 @@ impl WithSimd for Forward<'_> {
     }
 }
 
-/// Gradients to the image, the weight and the bias.
+/// Gradients with respect to the image, the weight and the bias.
 ///
 /// ```text
 /// x̂ = (x − μ) r,   z = x̂ γ + β,   y = z or z σ(z)
@@ -109,7 +109,7 @@ impl WithSimd for Forward<'_> {
 /// # Shapes
 ///
 /// - `x`, `dy`: `[batch, channels, pixels]`; `parameters`: weight γ and bias β, `[channels]` each
-/// - result: `dx`, `dγ`, `dβ`, as what they are gradients to
+/// - result: `dx`, `dγ`, `dβ`, with the shapes of `x`, γ and β
 pub(crate) fn gradients(
     x: &[f32],
     dy: &[f32],
@@ -151,7 +151,7 @@ pub(crate) fn gradients(
     [dx, weight, bias]
 }
 
-/// One group of one image, on the way back.
+/// One group of one image in the backward pass.
 struct Backward<'a> {
     x: &'a [f32],
     dy: &'a [f32],
@@ -192,7 +192,7 @@ impl WithSimd for Backward<'_> {
 }
 
 impl Backward<'_> {
-    /// Writes dz where dx will be, and sums it.
+    /// Writes dz into the buffer of dx, and sums it.
     #[inline(always)]
     fn through_silu(&mut self) {
         let pixels = self.shape.pixels;
@@ -271,7 +271,7 @@ mod tests {
             let (y, _) = normalize(&x, [&weight, &bias], &shape);
             let exact = exact(&wide(&x), &wide(&weight), &wide(&bias), &shape);
             for (y, exact) in y.iter().zip(exact) {
-                // Values below 2, a dozen roundings each.
+                // Values are below 2, with a dozen roundings each.
                 assert!((f64::from(*y) - exact).abs() < 12.0 * 2.0 * 6e-8);
             }
         }
@@ -312,7 +312,7 @@ mod tests {
                             .sum::<f64>()
                     };
                     let slope = (at(1e-5) - at(-1e-5)) / 2e-5;
-                    // Of order 1: 70 terms in f32, and (10⁻⁵)² of the third derivative.
+                    // Gradients are of order 1: 70 terms in f32, and (10⁻⁵)² times the third derivative.
                     let error = (f64::from(*ours) - slope).abs();
                     assert!(error < 1e-5, "input {input}, element {i}: {ours} {slope}");
                 }

@@ -6,9 +6,9 @@ use rayon::prelude::*;
 use super::arch::arch;
 use super::sum::{product_sum, sum};
 
-/// Elements that one core takes at a time.
+/// Elements that one core processes at a time.
 const PART: usize = 1 << 14;
-/// Columns whose sum is one core's work.
+/// Columns that one core sums at a time.
 const COLUMNS: usize = 64;
 
 /// Mean and 1 / √(variance + ε) of every token.
@@ -45,7 +45,7 @@ pub(crate) fn normalize(x: &[f32], parameters: [&[f32]; 2], epsilon: f32) -> (Ve
     (y, moments)
 }
 
-/// Some tokens to be normalised.
+/// Some tokens in the forward pass.
 struct Forward<'a> {
     x: &'a [f32],
     parameters: [&'a [f32]; 2],
@@ -75,7 +75,7 @@ impl WithSimd for Forward<'_> {
     }
 }
 
-/// Gradient to the tokens.
+/// Gradient with respect to the tokens.
 ///
 /// ```text
 /// dx = r (γ dy − ⟨γ dy⟩ − x̂ ⟨γ dy x̂⟩)        x̂ = (x − μ) r,   ⟨·⟩: mean over the token
@@ -83,7 +83,7 @@ impl WithSimd for Forward<'_> {
 ///
 /// # Shapes
 ///
-/// - `x`, `dy`: `[tokens, channels]`; `weight`: γ, `[channels]`; `moments`: of [`normalize`]
+/// - `x`, `dy`: `[tokens, channels]`; `weight`: γ, `[channels]`; `moments`: from [`normalize`]
 /// - result: as `x`
 pub(crate) fn to_input(x: &[f32], dy: &[f32], weight: &[f32], moments: &[[f32; 2]]) -> Vec<f32> {
     let channels = weight.len();
@@ -106,7 +106,7 @@ pub(crate) fn to_input(x: &[f32], dy: &[f32], weight: &[f32], moments: &[[f32; 2
     dx
 }
 
-/// Some tokens on the way back.
+/// Some tokens in the backward pass.
 struct Backward<'a> {
     x: &'a [f32],
     dy: &'a [f32],
@@ -137,7 +137,7 @@ impl WithSimd for Backward<'_> {
     }
 }
 
-/// Gradients to γ, `Σ dy x̂`, and to β, `Σ dy`, over all tokens: `[channels]` each.
+/// Gradients with respect to γ, `Σ dy x̂`, and to β, `Σ dy`, over all tokens: `[channels]` each.
 pub(crate) fn to_parameters(
     x: &[f32],
     dy: &[f32],

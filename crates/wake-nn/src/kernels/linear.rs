@@ -1,7 +1,7 @@
-//! Products of whole matrices, as a linear layer and its gradients need them.
+//! Matrix products of a linear layer and its gradients.
 //!
-//! Every task makes some rows and columns of a product, a stretch of the depth at a time: its columns of the right factor are packed
-//! by tiles, which stay in a core's second cache, and rows of the left one pass by as they lie.
+//! Every task computes some rows and columns of a product, one stretch of the depth at a time: its columns of the right
+//! factor are packed by tiles, which stay in a core's L2 cache, and rows of the left factor are read in place.
 
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
@@ -11,14 +11,14 @@ use super::columns::columns;
 use super::product::Rows;
 use super::tile::{self, ROWS};
 
-/// Rows that a tile of the right factor meets before the next one does, a multiple of a tile's.
+/// Rows multiplied with one tile of the right factor before the next, a multiple of a tile's rows.
 const BLOCK: usize = 8 * ROWS;
 /// Numbers of a row that are multiplied at a time: a tile takes 24 KiB with the widest vectors.
 const DEPTH: usize = 192;
-/// Columns of a task, or whose sum is one core's work.
+/// Columns that one core multiplies or sums at a time.
 const COLUMNS: usize = 128;
 
-/// The sizes of a layer: rows, what comes in, what goes out.
+/// Sizes of a layer: rows, input channels and output channels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sizes {
     pub(crate) rows: usize,
@@ -40,20 +40,20 @@ pub(crate) fn forward(x: &[f32], weight: &[f32], bias: Option<&[f32]>, sizes: Si
     )
 }
 
-/// The gradient to x: `g Wᵀ`, `[rows, from]`.
+/// Gradient with respect to x: `g Wᵀ`, `[rows, from]`.
 pub(crate) fn to_input(gradient: &[f32], weight: &[f32], sizes: Sizes) -> Vec<f32> {
     let sizes = [sizes.rows, sizes.to, sizes.from];
     product(gradient, Factor::Transposed(weight), None, sizes)
 }
 
-/// The gradient to W: `xᵀ g`, `[from, to]`.
+/// Gradient with respect to W: `xᵀ g`, `[from, to]`.
 pub(crate) fn to_weight(x: &[f32], gradient: &[f32], sizes: Sizes) -> Vec<f32> {
     let left = transposed(x, sizes.rows, sizes.from);
     let sizes = [sizes.from, sizes.rows, sizes.to];
     product(&left, Factor::Plain(gradient), None, sizes)
 }
 
-/// The gradient to b: the sum over all rows, `[to]`.
+/// Gradient with respect to b: the sum over all rows, `[to]`.
 pub(crate) fn to_bias(gradient: &[f32], to: usize) -> Vec<f32> {
     let mut sums = vec![0.0; to];
     sums.par_chunks_mut(COLUMNS)
@@ -68,7 +68,7 @@ pub(crate) fn to_bias(gradient: &[f32], to: usize) -> Vec<f32> {
     sums
 }
 
-/// `[columns, rows]` of a matrix `[rows, columns]`.
+/// Transposes a matrix `[rows, columns]` to `[columns, rows]`.
 fn transposed(matrix: &[f32], rows: usize, columns: usize) -> Vec<f32> {
     let mut out = vec![0.0; matrix.len()];
     out.par_chunks_mut(rows * ROWS)
@@ -91,14 +91,14 @@ enum Factor<'a> {
     Transposed(&'a [f32]),
 }
 
-/// The product of two matrices, and a bias for every column.
+/// Product of two matrices, plus a bias for every column.
 ///
 /// # Shapes
 ///
 /// Factors: `[rows, depth]` and `[depth, columns]`; result: `[rows, columns]`
 fn product(left: &[f32], right: Factor<'_>, bias: Option<&[f32]>, sizes: [usize; 3]) -> Vec<f32> {
     let [rows, _, wide] = sizes;
-    // Every task packs its columns again: use as many rows a task as leave four tasks a core.
+    // Every task packs its columns again: take as many rows per task as leave four tasks per core.
     let shares = (4 * rayon::current_num_threads()).div_ceil(wide.div_ceil(COLUMNS));
     let many = rows.div_ceil(shares).next_multiple_of(BLOCK);
     let mut out = vec![0.0; rows * wide];
@@ -129,7 +129,7 @@ struct Task<'a, 'b> {
     sizes: [usize; 3],
     /// The first row and column.
     first: [usize; 2],
-    /// These columns of each row.
+    /// The columns of this task in each of its rows.
     out: &'a mut [&'b mut [f32]],
 }
 
@@ -157,7 +157,7 @@ impl WithSimd for Task<'_, '_> {
 }
 
 impl Task<'_, '_> {
-    /// Packs a stretch of the depth of these columns of the right factor: `[tile, depth, column]`.
+    /// Packs a stretch of the depth of this task's columns of the right factor: `[tile, depth, column]`.
     fn pack(&self, first: usize, count: usize, width: usize, packed: &mut [f32]) {
         let [_, depth, columns] = self.sizes;
         let begin = self.first[1] / width;
@@ -179,7 +179,7 @@ impl Task<'_, '_> {
         }
     }
 
-    /// Adds the product of six rows and one tile over a stretch of the depth from the `first` on.
+    /// Adds the product of six rows and one tile over a stretch of the depth, beginning at `first`.
     #[inline(always)]
     fn multiply<S: Simd>(&mut self, simd: S, [row, first, tile]: [usize; 3], panel: &[f32]) {
         let width = tile::width::<S>();
@@ -233,7 +233,7 @@ mod tests {
                         exact: &dyn Fn(usize, usize) -> f64| {
                 for (n, value) in found.iter().enumerate() {
                     let exact = exact(n / columns, n % columns);
-                    // As many roundings of sums below a quarter of their number.
+                    // As many roundings as terms, of sums below a quarter of their number.
                     let allowed = 6e-8 * (1.0 + count as f64).powf(1.5);
                     assert!((f64::from(*value) - exact).abs() < allowed, "{sizes:?} {n}");
                 }

@@ -1,7 +1,8 @@
-//! Arithmetic on plain slices for burn's CPU backend: convolutions and normalisations, forward and backward.
+//! Arithmetic on plain slices for burn's CPU backend, forward and backward: convolution, attention, linear layers,
+//! normalisation and activations.
 //!
 //! Images are `[batch, channels, rows, columns]` in row-major order, as in a contiguous tensor.
-//! All cores work; every sum has a fixed order, whatever their number.
+//! All cores are used; every sum has a fixed order that does not depend on their number.
 
 mod arch;
 pub(super) mod attention;

@@ -1,4 +1,4 @@
-//! Activations of every element, and their derivatives, in vector instructions and on all cores.
+//! Elementwise activations and their derivatives, in vector instructions and on all cores.
 
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
@@ -14,10 +14,10 @@ pub(crate) enum Curve {
     Gelu,
 }
 
-/// Elements that one core takes at a time.
+/// Elements that one core processes at a time.
 const PART: usize = 1 << 13;
 
-/// A curve at every element.
+/// Applies a curve to every element.
 pub(crate) fn map(x: &[f32], curve: Curve) -> Vec<f32> {
     let mut y = vec![0.0; x.len()];
     let arch = Arch::new();
@@ -27,7 +27,7 @@ pub(crate) fn map(x: &[f32], curve: Curve) -> Vec<f32> {
     y
 }
 
-/// The gradient to `x` of [`map`], by that to its result.
+/// Gradient of [`map`] with respect to `x`, from the gradient of its result.
 pub(crate) fn map_gradient(x: &[f32], dy: &[f32], curve: Curve) -> Vec<f32> {
     let mut dx = dy.to_vec();
     let arch = Arch::new();
@@ -37,7 +37,7 @@ pub(crate) fn map_gradient(x: &[f32], dy: &[f32], curve: Curve) -> Vec<f32> {
     dx
 }
 
-/// The gate of a gated feed-forward layer: of every token `(a, b)` it leaves `a ⊙ gelu(b)`.
+/// Gate of a gated feed-forward layer: maps every token `(a, b)` to `a ⊙ gelu(b)`.
 ///
 /// # Shapes
 ///
@@ -52,7 +52,7 @@ pub(crate) fn gate(x: &[f32], inner: usize) -> Vec<f32> {
     y
 }
 
-/// The gradient to `x` of [`gate`], by that to its result.
+/// Gradient of [`gate`] with respect to `x`, from the gradient of its result.
 ///
 /// # Shapes
 ///
@@ -72,14 +72,15 @@ fn tokens_at_once(inner: usize) -> usize {
     (PART / inner.max(1)).max(1)
 }
 
-/// Φ(x), the share of normal numbers below x.
+/// Φ(x), the standard normal distribution function.
 ///
 /// ```text
 /// ½ erfc(u) = ½ t Q(t) e^(−u²),   u = |x|/√2,   t = 1/(1 + 0.35 u)
 /// ```
 ///
-/// Q is the polynomial of degree 9 whose largest relative error is least for u from 0 to 9.6, 7e-9: fitted here to erfc of
-/// forty digits. In 32 bits Φ(x) is right to 8 units in the last place down to x = −1, and relatively to u² of them below.
+/// Q is the polynomial of degree 9 with the least maximum of the relative error for u from 0 to 9.6, 7e-9: fitted here to
+/// erfc with forty digits. In f32, Φ(x) is right to 8 units in the last place down to x = −1; below, the relative error
+/// grows to u² units.
 #[inline(always)]
 fn normal(x: f32) -> f32 {
     const Q: [f32; 9] = [
@@ -218,7 +219,7 @@ mod tests {
     use super::super::noise;
     use super::*;
 
-    /// Φ by its integral, 4,000 intervals of Simpson's rule from x to x + 12 (below −12 nothing is left in 32 bits).
+    /// Φ by its integral: Simpson's rule with 4,000 intervals from x to x + 12 (below −12 nothing is left in f32).
     fn integral(x: f64) -> f64 {
         let density = |x: f64| (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt();
         let (n, step) = (4000, 12.0 / 4000.0);
@@ -239,7 +240,7 @@ mod tests {
         for k in -1100..=1100 {
             let x = k as f32 * 1e-2;
             let exact = integral(f64::from(x));
-            // The exponent −u² is rounded, which its exponential multiplies.
+            // The exponential amplifies the rounding of its exponent −u².
             let units = 8.0 + f64::from(x.min(0.0) * x);
             let error = (f64::from(normal(x)) / exact - 1.0).abs();
             assert!(error < units * f64::from(f32::EPSILON), "{x}: {error:e}");
@@ -248,7 +249,7 @@ mod tests {
         assert!((normal(1e30) - 1.0).abs() < f32::EPSILON);
     }
 
-    /// Slopes are the difference quotients of their curves, in 64 bits.
+    /// Slopes equal the difference quotients of their curves in f64.
     #[test]
     fn slopes_are_difference_quotients() {
         let step = 1e-4;
@@ -257,7 +258,7 @@ mod tests {
             let gelu = |x: f64| x * integral(x);
             let swish = |x: f64| x / (1.0 + (-1.702 * x).exp());
             let quotient = |f: &dyn Fn(f64) -> f64| (f(x + step) - f(x - step)) / (2.0 * step);
-            // Third derivatives below 2, times the step's square over 6; and rounding.
+            // Third derivatives are below 2, times the squared step over 6; the rest is rounding.
             let bound = 1e-8 + 8.0 * f64::from(f32::EPSILON);
             for (slope, quotient) in [
                 (gelu_slope(x as f32), quotient(&gelu)),
@@ -271,7 +272,7 @@ mod tests {
         }
     }
 
-    /// All elements are done, whatever their number, and the gate is that of every token.
+    /// Every element is computed for any number of elements, and the gate applies to every token.
     #[test]
     fn every_element_is_done() {
         for count in [0, 1, 7, PART - 1, PART, 3 * PART + 5] {

@@ -1,4 +1,4 @@
-//! Products of small matrices: rows as they lie in memory, with columns packed by tiles.
+//! Products of small matrices: rows are read in place, columns are packed by tiles.
 
 use pulp::Simd;
 
@@ -16,12 +16,12 @@ pub(super) struct Rows<'a> {
 }
 
 impl<'a> Rows<'a> {
-    /// Row `i`, or the last, from its first to its `length`th number.
+    /// First `length` numbers of row `i`, or of the last row if there is no row `i`.
     pub(super) fn get(&self, i: usize, length: usize) -> &'a [f32] {
         &self.values[i.min(self.count - 1) * self.step..][..length]
     }
 
-    /// The same rows from the `first` on, `count` at most.
+    /// The rows from the `first` on, at most `count` of them.
     pub(super) fn from(&self, first: usize, count: usize) -> Self {
         Self {
             values: &self.values[first * self.step..],
@@ -66,7 +66,7 @@ impl<'a> Rows<'a> {
         packed: &mut [f32],
     ) {
         let rows = width.min(self.count - tile * width);
-        // Few columns at a time: the places that they are written to stay in a core's first cache.
+        // Few columns at a time, so that the places they are written to stay in a core's L1 cache.
         for (n, packed) in packed.chunks_mut(SQUARE * width).enumerate() {
             for i in 0..rows {
                 let row = &self.get(tile * width + i, columns)[n * SQUARE..];
@@ -78,8 +78,7 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// Where a product goes: rows `step` apart, as many columns as wanted, in place of what was there or
-/// added to it.
+/// Destination of a product: rows `step` apart and `columns` wide, which the product replaces or is added to.
 #[derive(Debug)]
 pub(super) struct Target<'a> {
     pub(super) values: &'a mut [f32],

@@ -6,7 +6,7 @@ pub(super) fn sigmoid(z: f32) -> f32 {
     1.0 / (1.0 + exp(-z))
 }
 
-/// e^x for −87 ≤ x ≤ 87; below, 0; above, the value there.
+/// e^x for −87 ≤ x ≤ 87; 0 below, and its value at 87 above.
 ///
 /// ```text
 /// e^x = 2^n e^r,   n = round(x / ln 2),   |r| ≤ ½ ln 2
@@ -17,7 +17,7 @@ pub(super) fn sigmoid(z: f32) -> f32 {
 pub(super) fn exp(x: f32) -> f32 {
     // Adding 1.5 · 2²³ leaves round(x / ln 2) in the lowest bits.
     const ROUND: f32 = 12_582_912.0;
-    // ln 2 in two parts, of which the first has so few digits that n times it is exact.
+    // ln 2 in two parts, the first with so few digits that n times it is exact.
     const LN2: [f32; 2] = [0.693_359_4, -2.121_944_4e-4];
     let small = x < -87.0;
     let x = x.clamp(-87.0, 87.0);

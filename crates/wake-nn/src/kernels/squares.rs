@@ -2,12 +2,12 @@
 
 use rayon::prelude::*;
 
-/// How planes are cut into squares.
+/// Division of planes into squares.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Cut {
-    /// Pixels of a square's side.
+    /// Side of a square in pixels.
     pub(crate) size: usize,
-    /// Squares below each other, and side by side.
+    /// Number of squares down and across.
     pub(crate) squares: [usize; 2],
 }
 

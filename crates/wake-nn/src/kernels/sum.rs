@@ -1,4 +1,4 @@
-//! Sums in 16 parts, as fast as memory allows: they round less than a running sum, too.
+//! Sums in 16 parts, which are as fast as memory allows and round less than a running sum.
 
 /// `Σ_i of(values[i])`
 #[inline(always)]

@@ -1,4 +1,4 @@
-//! The register tile that every matrix product here is made of.
+//! Register tile of which all matrix products here consist.
 
 use pulp::{Simd, WithSimd};
 
@@ -13,7 +13,7 @@ pub(super) const fn width<S: Simd>() -> usize {
     2 * S::F32_LANES
 }
 
-/// Asks for the width of a tile on this machine.
+/// Task that returns the width of a tile on this machine.
 pub(super) struct Width;
 
 impl WithSimd for Width {
@@ -33,7 +33,7 @@ impl WithSimd for Width {
 ///
 /// # Shapes
 ///
-/// - `rows[i]`: as long as the panel from `start` on, or longer
+/// - `rows[i]`: at least as long as the panel, counted from `start`
 /// - `panel`: `[k, width]`
 #[inline(always)]
 pub(super) fn multiply<S: Simd>(
@@ -68,7 +68,7 @@ pub(super) fn multiply<S: Simd>(
 ///
 /// # Shapes
 ///
-/// - `left`: rows `step` apart, `[k, columns.end]`; of fewer than six columns the sums of the others are left
+/// - `left`: rows `step` apart, `[k, columns.end]`; with fewer than six columns the other sums stay unchanged
 /// - `panel`: `[k, width]`
 #[inline(always)]
 pub(super) fn multiply_columns<S: Simd>(
@@ -107,7 +107,7 @@ pub(super) fn start<S: Simd>(simd: S, values: [f32; ROWS]) -> Sums<S> {
     sums
 }
 
-/// Sums that start where `row` left off.
+/// Sums that continue from those in `row`.
 #[inline(always)]
 pub(super) fn load<S: Simd>(simd: S, row: &[f32]) -> [S::f32s; 2] {
     match S::as_simd_f32s(row).0 {
@@ -117,7 +117,7 @@ pub(super) fn load<S: Simd>(simd: S, row: &[f32]) -> [S::f32s; 2] {
     }
 }
 
-/// Writes the sums of one row, as many as `row` holds.
+/// Writes the sums of one row, as many as fit in `row`.
 #[inline(always)]
 pub(super) fn store<S: Simd>(sums: [S::f32s; 2], row: &mut [f32]) {
     let lanes: &[f32] = pulp::bytemuck::cast_slice(&sums);
@@ -153,7 +153,7 @@ mod tests {
         }
     }
 
-    /// One plus the product, on whatever this machine has and on one lane.
+    /// Adds a product to ones, with the vectors of this machine and with a single lane.
     #[test]
     fn a_tile_is_a_matrix_product() {
         let (rows, panel) = (noise(ROWS * 10, 1), noise(9 * 64, 2));

@@ -1,4 +1,4 @@
-//! Finding the weight files of a folder, and reading them one tensor at a time.
+//! Finds the weight files of a folder and reads them one tensor at a time.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -16,8 +16,7 @@ use super::names::modern;
 use crate::error::{Error, Result};
 use whole_files::failed;
 
-/// File names of models, the preferred ones first, each with the names of the index that it may have
-/// instead, in shards.
+/// File names of models in order of preference, each with the names that an index of shards may have instead.
 const NAMES: [(&str, &[&str]); 4] = [
     (
         "diffusion_pytorch_model.safetensors",
@@ -41,10 +40,10 @@ const NAMES: [(&str, &[&str]); 4] = [
     ),
 ];
 
-/// Bytes that are read and converted at once, so that no tensor lies in memory twice.
+/// Bytes that are read and converted at once, so that no tensor is in memory twice.
 const CHUNK: usize = 1 << 20;
 
-/// One open file, its header read and checked.
+/// An open file whose header has been read and checked.
 #[derive(Debug)]
 pub(super) struct WeightFile {
     pub(super) path: PathBuf,
@@ -52,15 +51,15 @@ pub(super) struct WeightFile {
     header: Header,
 }
 
-/// Where the bytes of a file are.
+/// Location of a file's bytes.
 #[derive(Debug)]
 enum Contents {
     Disk(File),
-    /// Part of the program.
+    /// Embedded in the program.
     Memory(&'static [u8]),
 }
 
-/// What tensors are read from.
+/// Source from which tensors are read.
 trait ReadSeek: Read + Seek {}
 impl<T: Read + Seek> ReadSeek for T {}
 
@@ -80,7 +79,7 @@ impl Contents {
     }
 }
 
-/// One tensor of a file, not read yet.
+/// A tensor of a file that has not been read yet.
 pub struct Stored<'a> {
     name: String,
     info: &'a TensorInfo,
@@ -98,7 +97,7 @@ impl WeightFiles {
     ///
     /// # Errors
     ///
-    /// [`Error::MissingFile`], [`Error::Io`] or [`Error::InvalidSafetensors`] for files that are not there or are damaged.
+    /// [`Error::MissingFile`], [`Error::Io`] or [`Error::InvalidSafetensors`] for files that are missing or damaged.
     pub fn open(path: &Path) -> Result<Self> {
         if !path.is_dir() {
             return Self::whole(path);
@@ -122,7 +121,7 @@ impl WeightFiles {
         })
     }
 
-    /// A file that is part of the program; `name` only serves messages.
+    /// Opens a file embedded in the program; `name` is used only in messages.
     pub(crate) fn embedded(name: &str, bytes: &'static [u8]) -> Result<Self> {
         Ok(Self {
             files: vec![WeightFile::new(Path::new(name), Contents::Memory(bytes))?],
@@ -135,7 +134,7 @@ impl WeightFiles {
         })
     }
 
-    /// The shards of an index, which must hold what it says.
+    /// Opens the shards of an index, which must hold the tensors that it lists.
     fn shards(index: &ShardIndex) -> Result<Self> {
         let files = index.paths().map(|path| WeightFile::open(&path));
         let files: Vec<WeightFile> = files.collect::<Result<_>>()?;
@@ -145,14 +144,14 @@ impl WeightFiles {
         Ok(Self { files })
     }
 
-    /// An entry of the headers' free text, where one of them has it.
+    /// Returns an entry of the headers' free text, if one of them has it.
     pub fn note(&self, key: &str) -> Option<&str> {
         let headers = self.files.iter().map(WeightFile::metadata);
         let mut notes = headers.filter_map(|header| header.metadata().as_ref());
         notes.find_map(|notes| notes.get(key)).map(String::as_str)
     }
 
-    /// All tensors under their present names.
+    /// Returns all tensors under their current names.
     ///
     /// # Errors
     ///
@@ -181,7 +180,7 @@ impl WeightFiles {
 
 impl WeightFile {
     fn open(path: &Path) -> Result<Self> {
-        // Opening a pipe would wait for somebody to write into it.
+        // Opening a pipe would wait for a writer.
         let found = std::fs::metadata(path).map_err(|source| failed("read", path, source))?;
         if !found.is_file() {
             return Err(Error::InvalidSafetensors {
@@ -209,7 +208,7 @@ impl WeightFile {
         &self.header.metadata
     }
 
-    /// Hands the bytes of a tensor over, a chunk of whole numbers at a time.
+    /// Passes on the bytes of a tensor, one chunk of whole numbers at a time.
     fn for_chunks(&self, info: &TensorInfo, mut each: impl FnMut(&[u8])) -> std::io::Result<()> {
         let (start, end) = info.data_offsets;
         let mut file = self.contents.reader();
@@ -236,7 +235,7 @@ impl Stored<'_> {
         self.info.dtype
     }
 
-    /// Whether the numbers are of a kind that weights are stored in.
+    /// Whether the tensor has a number type in which weights are stored.
     pub fn is_float(&self) -> bool {
         matches!(
             self.dtype(),
@@ -244,7 +243,7 @@ impl Stored<'_> {
         )
     }
 
-    /// Reads the numbers, as f32, whatever they are.
+    /// Reads the numbers as f32; they need not be finite.
     ///
     /// # Errors
     ///
@@ -258,7 +257,7 @@ impl Stored<'_> {
         }
     }
 
-    /// Reads the numbers, as f32; all must be finite.
+    /// Reads the numbers as f32 and checks that all are finite.
     ///
     /// # Errors
     ///
@@ -277,7 +276,7 @@ impl Stored<'_> {
 
     fn converted<const N: usize>(&self, number: impl Fn([u8; N]) -> f32) -> Result<Vec<f32>> {
         let (start, end) = self.info.data_offsets;
-        // The header's offsets lie within the file, so this is no more than it holds.
+        // The header's offsets lie within the file, so this allocates no more than the file holds.
         let mut numbers = Vec::with_capacity((end - start) / N);
         let converted = self.file.for_chunks(self.info, |bytes| {
             let (whole, _) = bytes.as_chunks::<N>();

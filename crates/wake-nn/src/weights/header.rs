@@ -14,23 +14,23 @@ use whole_files::failed;
 /// The format's own limit on the length of a header.
 const LONGEST: u64 = 100_000_000;
 
-/// Bytes of the header's length.
+/// Bytes of the field that holds the header's length.
 const LENGTH: u64 = 8;
 
-/// What a file says about its tensors.
+/// Description of a file's tensors.
 #[derive(Debug)]
 pub(super) struct Header {
     pub(super) metadata: Metadata,
-    /// Where in the file the data begin.
+    /// Position of the data in the file.
     pub(super) data_start: u64,
 }
 
 /// Reads and checks the header of a file.
 ///
-/// Tensors must lie side by side from the header to the end of the file, as long as their shapes
-/// say, each under a name of its own. Nothing is allocated that the file does not hold.
+/// Tensors must be contiguous from the header to the end of the file, as long as their shapes imply,
+/// each under a name of its own. No more is allocated than the file holds.
 ///
-/// - `file`: at its first byte
+/// - `file`: positioned at its first byte
 /// - `size`: its length in bytes
 pub(super) fn read(path: &Path, mut file: impl Read, size: u64) -> Result<Header> {
     let io = |source| failed("read", path, source);
@@ -63,7 +63,7 @@ pub(super) fn read(path: &Path, mut file: impl Read, size: u64) -> Result<Header
     })
 }
 
-/// The tensors of a header, of which none may occur twice: a reader would take the last in silence.
+/// Parses the tensors of a header and rejects duplicate names, of which a reader would silently take the last.
 fn parse(text: &[u8]) -> Result<Metadata, serde_json::Error> {
     let mut json = serde_json::Deserializer::from_slice(text);
     json.deserialize_map(DistinctNames)?;
@@ -114,7 +114,7 @@ mod tests {
         );
     }
 
-    /// A million open brackets are skipped without recursion, and refused for having no end.
+    /// A million open brackets are skipped without recursion, and rejected because they never close.
     #[test]
     fn deep_nesting_is_refused() {
         let deep = format!("{{\"a\": {}", "[".repeat(1 << 20));

@@ -8,7 +8,7 @@ use serde_json::Value;
 use crate::error::{Error, Result};
 use whole_files::read_text;
 
-/// The files that an index names, each with its tensors.
+/// Files listed in an index, each with its tensors.
 #[derive(Debug)]
 pub(super) struct ShardIndex {
     path: PathBuf,
@@ -16,7 +16,7 @@ pub(super) struct ShardIndex {
 }
 
 impl ShardIndex {
-    /// Reads an index; all shards must lie beside it.
+    /// Reads an index, whose shards must be in the same folder.
     pub(super) fn read(path: &Path) -> Result<Self> {
         let json: Value =
             serde_json::from_str(&read_text(path)?).map_err(|source| Error::Json {
@@ -47,7 +47,7 @@ impl ShardIndex {
             .map(|name| self.path.with_file_name(name))
     }
 
-    /// Refuses a shard that lacks a tensor which the index says it holds, or holds another one.
+    /// Rejects a shard that lacks a tensor listed for it or holds one that is not listed.
     pub(super) fn check(&self, shard: &Path, found: Vec<String>) -> Result<()> {
         let shard = shard.file_name().unwrap_or_default().to_string_lossy();
         let found: BTreeSet<String> = found.into_iter().collect();

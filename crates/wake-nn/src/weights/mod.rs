@@ -35,16 +35,16 @@ pub fn load<M: Module>(model: M, layout: Layout, path: &Path) -> Result<M> {
 /// Reads weights into a model: all of them, or none.
 ///
 /// `path` is a safetensors file, or a folder that holds one, in one piece or in shards with an index.
-/// Tensors are read and converted to `precision` one by one, whatever the file holds, so that the model
-/// is never held twice. The attention names of early autoencoders (`query`, `key`, `value`,
-/// `proj_attn`) and the buffer `position_ids` are known.
+/// Tensors are read and converted to `precision` one by one, whatever the file holds, so the model is
+/// never in memory twice. The attention names of early autoencoders (`query`, `key`, `value`,
+/// `proj_attn`) are recognised, and the buffer `position_ids` is ignored.
 ///
 /// # Errors
 ///
-/// [`Error::MissingFile`], [`Error::Io`] and [`Error::InvalidSafetensors`] for files that are not there
-/// or not to be trusted; [`Error::InvalidWeight`] for a number that is infinite or none;
+/// [`Error::MissingFile`], [`Error::Io`] and [`Error::InvalidSafetensors`] for files that are missing or
+/// invalid; [`Error::InvalidWeight`] for a number that is infinite or NaN;
 /// [`Error::WeightsMismatch`] with every tensor that is missing, unexpected or of
-/// another shape; [`Error::UnsupportedPrecision`] where the device cannot compute with it.
+/// another shape; [`Error::UnsupportedPrecision`] if the device cannot compute with it.
 pub fn load_as<M: Module>(
     model: M,
     layout: Layout,
@@ -55,11 +55,11 @@ pub fn load_as<M: Module>(
     load_files(model, layout, path, precision, &WeightFiles::open(path)?)
 }
 
-/// Reads weights that are part of the program, as f32; `name` only serves messages.
+/// Reads weights that are embedded in the program, as f32; `name` is used only in messages.
 ///
 /// # Errors
 ///
-/// As [`load_as`], for what is no weight file or that of another model.
+/// As [`load_as`], for bytes that are not a weight file or belong to another model.
 pub fn load_bytes<M: Module>(
     model: M,
     layout: Layout,
@@ -96,11 +96,11 @@ fn load_files<M: Module>(
     })
 }
 
-/// Whether a file has tensors below a prefix.
+/// Whether a file has tensors with this first part of their dotted names.
 ///
 /// # Errors
 ///
-/// As [`load_as`], for files that are not there or are damaged.
+/// As [`load_as`], for files that are missing or damaged.
 pub fn has_prefix(path: &Path, prefix: &str) -> Result<bool> {
     let files = WeightFiles::open(path)?;
     Ok(files
@@ -118,7 +118,7 @@ pub fn save<M: Module>(model: &M, layout: Layout, path: &Path) -> Result<()> {
     save_as(model, layout, path, Precision::F32)
 }
 
-/// Names and shapes that a model has in a file, without making its weights.
+/// Names and shapes of a model's weights in a file, without computing the weights.
 pub fn shapes<M: Module>(model: &M, layout: Layout) -> BTreeMap<String, Vec<usize>> {
     let mut shapes = BTreeMap::new();
     visit(model, layout, |weight, _| {
@@ -127,7 +127,7 @@ pub fn shapes<M: Module>(model: &M, layout: Layout) -> BTreeMap<String, Vec<usiz
     shapes
 }
 
-/// What does not fit between a model and its files.
+/// Differences between a model and its files.
 fn compare(
     expected: &BTreeMap<String, Vec<usize>>,
     stored: &BTreeMap<String, Stored<'_>>,

@@ -1,4 +1,4 @@
-//! What a parameter is called in a file.
+//! Names of parameters in files.
 //!
 //! | here | in the file |
 //! | --- | --- |
@@ -8,7 +8,7 @@
 //! | `attentions.0.attention.to_q` (autoencoder) | `attentions.0.to_q` |
 //! | `layers`, `…_embedding`, `final_layer_norm` (text) | below `text_model`, `.encoder`, `.embeddings` |
 
-/// Whose names a file uses.
+/// Naming scheme of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Layout {
     /// U-Net and autoencoder, as diffusers writes them.
@@ -17,14 +17,14 @@ pub enum Layout {
     ClipText,
 }
 
-/// Where in a model a parameter lies.
+/// Path of a parameter in a model.
 #[derive(Debug, Default)]
 pub(super) struct ModulePath {
     segments: Vec<(String, String)>,
 }
 
 impl ModulePath {
-    /// Goes into a module of this name, which the container holds.
+    /// Enters the module `name` of a container.
     pub(super) fn enter(&mut self, name: &str, container: &str) {
         self.segments.push((name.to_owned(), container.to_owned()));
     }
@@ -34,7 +34,7 @@ impl ModulePath {
         self.segments.pop();
     }
 
-    /// Whether a file holds the transpose: the matrices of linear layers.
+    /// Whether a file holds the transpose, as for the matrices of linear layers.
     pub(super) fn is_transposed(&self, rank: usize) -> bool {
         let owner = self
             .segments
@@ -44,9 +44,9 @@ impl ModulePath {
         rank == 2 && owner.is_some_and(|(_, container)| container == "Struct:Linear")
     }
 
-    /// The name in a file.
+    /// Name of the parameter in a file.
     pub(super) fn file_name(&self, layout: Layout) -> String {
-        // The variants of an enum of layers are no level of their own.
+        // The variants of an enum of layers do not count as a level.
         let segments = self.segments.iter().map(|(name, _)| name.as_str());
         let segments: Vec<&str> = segments
             .filter(|name| !["Conv", "Linear"].contains(name))
@@ -83,7 +83,7 @@ fn below_text_model(name: &str) -> String {
     format!("text_model.{part}{name}")
 }
 
-/// The name that a tensor has today, where it was called otherwise.
+/// Current name of a tensor, which older files may name differently.
 pub(super) fn modern(name: &str) -> String {
     const OLD: [(&str, &str); 4] = [
         (".query.", ".to_q."),
@@ -95,7 +95,7 @@ pub(super) fn modern(name: &str) -> String {
         .fold(name.to_owned(), |name, (old, new)| name.replace(old, new))
 }
 
-/// Buffers that files carry and models do not need.
+/// Whether a tensor is a buffer, which files hold and models do not need.
 pub(super) fn is_buffer(name: &str) -> bool {
     name.ends_with(".position_ids")
 }

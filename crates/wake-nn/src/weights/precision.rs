@@ -1,10 +1,10 @@
-//! The kinds of number that weights are held or stored in.
+//! Floating-point types in which weights are held or stored.
 
 use burn::tensor::{DType, Device};
 
 use crate::error::{Error, Result};
 
-/// A kind of floating-point number.
+/// A floating-point type.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Precision {
     /// 32 bits; the default.
@@ -17,7 +17,7 @@ pub enum Precision {
 }
 
 impl Precision {
-    /// burn's name for it.
+    /// burn's data type for this precision.
     pub fn dtype(self) -> DType {
         match self {
             Self::F32 => DType::F32,
@@ -26,7 +26,7 @@ impl Precision {
         }
     }
 
-    /// Its name in a safetensors header.
+    /// Name of this precision in a safetensors header.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::F32 => "F32",
@@ -35,7 +35,7 @@ impl Precision {
         }
     }
 
-    /// An error unless all devices compute with it.
+    /// Returns an error unless all devices support this precision.
     pub(super) fn check(self, devices: &[Device]) -> Result<()> {
         match devices
             .iter()

@@ -16,7 +16,7 @@ use whole_files::{write_atomically, write_synced};
 
 /// Writes a model's weights into one safetensors file that diffusers or transformers read.
 ///
-/// Tensors are written one by one, so that the model is not held twice; the file takes its name when
+/// Tensors are written one by one, so the model is never in memory twice; the file gets its name once
 /// all of it is on disk.
 ///
 /// # Errors
@@ -31,7 +31,7 @@ pub fn save_as<M: Module>(
     save_noted(model, layout, path, precision, None)
 }
 
-/// [`save_as`] with an entry in the free text of the header, its key and its value.
+/// Writes weights as [`save_as`] does, with one entry, key and value, in the free text of the header.
 ///
 /// # Errors
 ///
@@ -59,7 +59,7 @@ pub fn save_noted<M: Module>(
 
 /// Writes a model's `config.json` and weights into a folder that `from_pretrained` reads.
 ///
-/// - `config`: what the `to_json` of the model's configuration gives
+/// - `config`: JSON from `to_json` of the model's configuration
 ///
 /// # Errors
 ///
@@ -83,7 +83,7 @@ pub fn save_folder<M: Module>(
     )?)
 }
 
-/// The header, in the order in which the parameters are visited, padded to a multiple of 8 bytes.
+/// Header with the parameters in the order of the visit, padded to a multiple of 8 bytes.
 fn header<M: Module>(
     model: &M,
     layout: Layout,

@@ -1,4 +1,4 @@
-//! The parameters of a model by the names that they have in files.
+//! Parameters of a model by their names in files.
 
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
 use burn::tensor::{DType, Device, Tensor, TensorData};
@@ -13,7 +13,7 @@ pub struct Weight {
     pub name: String,
     /// Shape in the file.
     pub shape: Vec<usize>,
-    /// Whether the model holds the transpose: the matrices of linear layers.
+    /// Whether the model holds the transpose, as for the matrices of linear layers.
     pub transposed: bool,
     /// Device of the parameter.
     pub device: Device,
@@ -38,7 +38,7 @@ impl Weight {
 /// Numbers of a parameter, in the order of the file.
 pub type Values<'a> = &'a dyn Fn() -> std::io::Result<TensorData>;
 
-/// Calls a function with each parameter of a model; numbers are made when they are asked for.
+/// Calls a function with each parameter of a model; its numbers are computed on request.
 pub fn visit<M: Module>(model: &M, layout: Layout, each: impl FnMut(Weight, Values<'_>)) {
     let path = ModulePath::default();
     model.visit(&mut Visitor { path, layout, each });
@@ -70,7 +70,7 @@ impl<F: FnMut(Weight, Values<'_>)> ModuleVisitor for Visitor<F> {
     }
 }
 
-/// A matrix turned from the model's order to the file's, or back.
+/// Converts a matrix from the model's order to the file's, or back.
 fn as_in_file<const D: usize>(tensor: Tensor<D>, transposed: bool) -> Tensor<D> {
     match transposed {
         true => tensor.swap_dims(0, 1),
@@ -81,12 +81,12 @@ fn as_in_file<const D: usize>(tensor: Tensor<D>, transposed: bool) -> Tensor<D> 
 /// Change of a parameter.
 #[derive(Debug)]
 pub enum Change {
-    /// Nothing.
+    /// No change.
     Kept,
-    /// This is added, in f32 and rounded once, whatever the parameter is held in: a matrix in the model's order, which is
-    /// reshaped to the parameter.
+    /// Adds this matrix, in f32 with one rounding, whatever the parameter's number type; the matrix is in the model's order
+    /// and is reshaped to the parameter.
     Added(Tensor<2>),
-    /// It is replaced by these numbers in the file's order, held as that.
+    /// Replaces the parameter by these numbers, which are in the file's order, and holds them in this type.
     Replaced(TensorData, DType),
 }
 

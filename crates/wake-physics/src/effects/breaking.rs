@@ -1,4 +1,4 @@
-//! Return of breaking waves, damped like the short ones.
+//! Return of breaking waves, damped together with the short waves.
 
 use super::effect::{Effect, NOT_ASKED_FOR, Site, Weight};
 use crate::linear::Amplitudes;
@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 #[derive(Debug)]
 pub(crate) struct BreakingWaves {
-    /// σ⁰, 0 where it is not asked for.
+    /// σ⁰ of breaking waves; 0 unless the scene asks for them.
     pub(crate) sigma0: f64,
 }
 

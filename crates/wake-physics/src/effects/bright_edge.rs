@@ -1,4 +1,5 @@
-//! Bright edges of turbulent wakes: the current of a wake moves and gathers echoes, and changes the waves that make them.
+//! Bright edges of turbulent wakes: the current of a wake displaces and concentrates echoes and modulates the waves that
+//! scatter.
 
 use super::effect::{Effect, NOT_ASKED_FOR, OUTSIDE, Site, Weight};
 use crate::constants::SPEED_OF_LIGHT;
@@ -17,7 +18,7 @@ use std::f64::consts::TAU;
 
 #[derive(Debug)]
 pub(crate) struct BrightEdges {
-    /// The current behind each ship that has one.
+    /// The current behind each ship that has a bright edge.
     pub(crate) edges: Vec<Option<WakeEdge>>,
     absent: Option<&'static str>,
 }
@@ -44,7 +45,7 @@ impl BrightEdges {
         self.edges.iter().flatten()
     }
 
-    /// Roots of mean squares over the image: what the currents change σ⁰ and its density in the image by, relative, and
+    /// Root mean squares over the image: the relative change of σ⁰ and of its density in the image by the currents, and
     /// their velocity along the line of sight [m/s].
     fn strength(&self, models: &Models) -> [f64; 2] {
         let of = |edge: &WakeEdge| {
@@ -53,7 +54,7 @@ impl BrightEdges {
                 let seen = edge.track.seen_from_ship(place);
                 let [port_x, port_y] = to_port(seen);
                 let along_sight = port_x * models.incidence.sin();
-                // Velocity bunching gathers by R/V times the slope of the velocity along azimuth.
+                // Velocity bunching concentrates echoes by R/V times the azimuth slope of the velocity.
                 let gathered = models.range_to_velocity * along_sight * port_y;
                 (edge.factor(seen) - 1.0).abs() + gathered * edge.divergence(seen).abs()
             };
@@ -66,13 +67,15 @@ impl BrightEdges {
                 rms_over(&models.pixels.computed, velocity),
             ]
         };
-        // Where wakes cross their changes add, at most.
+        // Where wakes cross, their changes add up at most.
         let each = self.drawn().map(of);
         each.fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d])
     }
 }
 
-/// - `strength`: root mean square change of σ⁰, relative, and velocity along the line of sight [m/s]
+/// Estimated change of the intensity, relative.
+///
+/// - `strength`: root mean square of the relative change of σ⁰ and of the velocity along the line of sight [m/s]
 pub(crate) fn estimate([change, velocity]: [f64; 2], amplitudes: &Amplitudes<'_>) -> f64 {
     let shift = amplitudes.first.modulation.range_to_velocity * velocity;
     change + shift / amplitudes.moving_width() * amplitudes.contrast
@@ -102,7 +105,7 @@ fn edge(scene: &Scene, models: &Models, ship: &Ship, wake: &KelvinWake) -> Optio
     })
 }
 
-/// A response \[s\] that is given for the reference wind: it follows the wind as the response of breaking waves does.
+/// Response time \[s\] in the scene's wind, from `time` at the reference wind; it scales with wind as for breaking waves.
 fn in_wind(time: f64, radar: &Radar, wind_speed: f64) -> f64 {
     let k_e = TAU * radar.frequency / SPEED_OF_LIGHT;
     let of = |wind| breaking::response_time(k_e, wind);
@@ -156,9 +159,9 @@ mod tests {
     use super::*;
     use crate::waves::Transfer;
 
-    /// The Bragg waves' part of an edge's response is that of the hydrodynamic modulation: the slope of their own action
-    /// spectrum, 4.93, 4.11 and 3.90 at L, C and X band for 5 m/s, 35° and a developed sea, over 0.04 (u*/c)² ω with Wu's
-    /// u* = 0.16771 m/s, by hand 0.06041, 0.5020 and 1.0748 1/s.
+    /// The Bragg part of an edge's response equals that of the hydrodynamic modulation: the slope of the Bragg waves'
+    /// action spectrum, 4.93, 4.11 and 3.90 at L, C and X band for 5 m/s, 35° and a developed sea, over 0.04 (u*/c)² ω.
+    /// With Wu's u* = 0.16771 m/s that rate is, by hand, 0.06041, 0.5020 and 1.0748 1/s.
     #[test]
     fn edges_answer_at_the_relaxation_rate_of_the_modulation() {
         for (gigahertz, slope, rate) in [
@@ -195,7 +198,7 @@ mod tests {
                 (found * rate / slope - 1.0).abs() < rounding,
                 "{gigahertz}: {found}"
             );
-            // The key of a scene is the rate of both.
+            // The scene's key sets the rate of both.
             scene.radar.relaxation_rate = Some(0.5);
             assert!((bragg(&scene) * 0.5 / slope - 1.0).abs() < rounding);
         }

@@ -1,4 +1,4 @@
-//! What every optional effect has: what it changes, and the stages that it takes part in.
+//! Interface of optional effects: what an effect changes, and the stages in which it takes part.
 
 use crate::fields::Fields;
 use crate::linear::Amplitudes;
@@ -9,32 +9,32 @@ use crate::waves::PlaneWaves;
 use crate::workspace::Workspace;
 use std::ops::Range;
 
-/// What an effect changes.
+/// Size of an effect's change to the image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Weight {
-    /// Why the scene has nothing of it.
+    /// Reason why the scene lacks the effect, if it does.
     pub(crate) absent: Option<&'static str>,
-    /// Relative root mean square change of the intensity without it.
+    /// Relative root mean square change of the intensity if the effect is left out.
     pub(crate) estimate: f64,
 }
 
-/// One optional effect: what it changes, and the stages that it takes part in.
+/// An optional effect: what it changes, and the stages in which it takes part.
 pub(crate) trait Effect {
-    /// Its name in scenes and plans.
+    /// The effect's name in scenes and plans.
     fn term(&self) -> Term;
 
-    /// What it changes in a scene.
+    /// Estimates how much the effect changes the image of a scene.
     fn weigh(&self, models: &Models, amplitudes: &Amplitudes<'_>) -> Weight;
 
-    /// Waves that it adds to the surface.
+    /// Waves that the effect adds to the surface.
     fn waves(&self, _site: &Site<'_>) -> Option<PlaneWaves> {
         None
     }
 
-    /// Adds velocities to the surface, once all waves are in.
+    /// Adds velocities to the surface, after all waves have been added.
     fn add_velocity(&self, _site: &Site<'_>, _fields: &mut Fields) {}
 
-    /// Multiplies the share of the Bragg waves that remains; `None` is all of them.
+    /// Multiplies the remaining share of the Bragg waves; `None` means that all remain.
     fn damp(&self, _site: &Site<'_>, _memory: &mut Workspace, _remaining: &mut Option<Field>) {}
 
     /// Changes σ⁰.
@@ -46,26 +46,26 @@ pub(crate) trait Effect {
     fn add_to_image(&self, _intensity: &mut Field) {}
 }
 
-/// The part of a scene that is drawn at once.
+/// The part of a scene that is computed in one go.
 pub(crate) struct Site<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) models: &'a Models,
-    /// All computed pixels with their margin.
+    /// All computed pixels, margin included.
     pub(crate) whole: Raster,
-    /// The rows of them that are drawn.
+    /// The rows of `whole` to compute.
     pub(crate) raster: Raster,
-    /// Number of the first of these rows.
+    /// Index of the first of these rows.
     pub(crate) first_row: usize,
 }
 
 impl Site<'_> {
-    /// The rows that are drawn, of all.
+    /// Range of the computed rows in `whole`.
     pub(crate) fn rows(&self) -> Range<usize> {
         self.first_row..self.first_row + self.raster.rows
     }
 }
 
-/// Why an effect that a scene must ask for is absent.
+/// Reason given for an effect that the scene does not ask for.
 pub(super) const NOT_ASKED_FOR: &str = "not asked for";
-/// Why an effect that lies beside the image is absent.
+/// Reason given for an effect that does not reach the image.
 pub(super) const OUTSIDE: &str = "it does not reach the image";

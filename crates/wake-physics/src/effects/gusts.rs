@@ -10,7 +10,7 @@ use std::sync::OnceLock;
 
 #[derive(Debug)]
 pub(crate) struct GustField {
-    /// Those of the scene that have a strength, each with its field at every few pixels, drawn for the first strip.
+    /// Gusts and eddies of non-zero strength, each with its coarse field and pixel step, drawn with the first strip.
     gusts: Vec<(Gusts, OnceLock<(Field, usize)>)>,
     /// Exponent of the wind speed in σ⁰.
     exponent: f64,
@@ -38,7 +38,8 @@ impl GustField {
 }
 
 impl GustField {
-    /// Fields that are interpolated, and those drawn at every pixel, whose FFTs take five times as long and as much memory.
+    /// Cost of the wind fields, in interpolated fields; the FFTs of a field drawn at every pixel take five times as long
+    /// and as much memory.
     ///
     /// - `spacing` of the computed pixels \[m\]
     pub(crate) fn patterns(&self, spacing: f64) -> f64 {

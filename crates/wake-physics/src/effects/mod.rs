@@ -1,8 +1,8 @@
-//! Optional effects, one file each: the numbers of a scene, the reason to leave the effect out, an estimate of what it
-//! changes, and its application.
+//! Optional effects, one file each: their parameters, the reason to leave them out, an estimate of what they change, and
+//! their application.
 //!
-//! An effect is a type with a function `new(&Scene, &Models)` and the trait [`Effect`]; a line of the list below makes it part
-//! of every scene.
+//! An effect is a type with a function `new(&Scene, &Models)` that implements [`Effect`]; a line in the list below adds it
+//! to every scene.
 
 mod breaking;
 pub(crate) mod bright_edge;
@@ -33,7 +33,7 @@ macro_rules! effects {
                 Self { $($name: <$type>::new(scene, models)),* }
             }
 
-            /// All of them.
+            /// All effects, in order.
             pub(crate) fn each(&self) -> impl Iterator<Item = &dyn Effect> {
                 [$(&self.$name as &dyn Effect),*].into_iter()
             }
@@ -53,7 +53,7 @@ effects! {
 }
 
 impl Effects {
-    /// σ⁰ that no wave modulates: of breaking waves and of noise.
+    /// σ⁰ that no wave modulates: breaking waves and noise.
     pub(crate) fn added(&self) -> [f64; 2] {
         [self.breaking.sigma0, self.noise.sigma0]
     }

@@ -1,4 +1,4 @@
-//! Noise of the radar.
+//! Thermal noise of the radar.
 
 use super::effect::{Effect, NOT_ASKED_FOR, Weight};
 use crate::linear::Amplitudes;

@@ -1,4 +1,4 @@
-//! Waves of ships that the computed pixels do not carry: variances of slopes and velocities by place.
+//! Ship waves too short for the computed pixels, as variances of slopes and velocities by position.
 
 use super::effect::{Effect, NOT_ASKED_FOR, OUTSIDE, Site, Weight};
 use crate::fields::Fields;
@@ -13,18 +13,18 @@ use crate::workspace::Workspace;
 use rayon::prelude::*;
 use std::f64::consts::{PI, SQRT_2};
 
-/// Rays on each side of a ship's track, and places on each.
+/// Rays on each side of a ship's track, and points on each ray.
 const RAY_POINTS: usize = 40;
 
-/// Step of the differences that give the curvature of σ⁰ \[1\].
+/// Step of the finite differences for the curvature of σ⁰ \[1\].
 const SLOPE_STEP: f64 = 0.05;
 
 #[derive(Debug)]
 pub(crate) struct SubpixelWakes {
-    /// Whether they count: where an impulse response is asked for, also if pixels of their own do as well. On the pixels of an
-    /// image as they are they are left out, as in the model that this one started from.
+    /// Whether these waves count: only if the scene asks for an impulse response and allows the term, even on finer
+    /// computed pixels. Otherwise they are left out, as in the original model.
     pub(crate) counted: bool,
-    /// The waves of each ship that has some.
+    /// The waves of each ship that makes such waves.
     pub(crate) waves: Vec<Option<SubpixelWake>>,
 }
 
@@ -43,15 +43,15 @@ impl SubpixelWakes {
         }
     }
 
-    /// The variances at a place (x, y) \[m\], if any wave reaches it.
+    /// The variances at a point (x, y) \[m\], or `None` where no wave reaches.
     fn at(&self, place: [f64; 2]) -> Option<Roughness> {
         let each = self.waves.iter().flatten();
         let each = each.filter_map(|waves| waves.at(place));
         each.reduce(|a, b| a.plus(&b))
     }
 
-    /// Roots of mean squares over the image: what they change σ⁰ by, relative, and the share of the width of a point that
-    /// their velocities add, 0 to 1.
+    /// Root mean squares over the image: the relative change of σ⁰, and the share of a point's width that the velocities
+    /// add, 0 to 1.
     fn strength(&self, models: &Models, backscatter: &Backscatter) -> [f64; 2] {
         if self.waves.iter().all(Option::is_none) {
             return [0.0; 2];
@@ -77,10 +77,10 @@ impl SubpixelWakes {
         ]
     }
 
-    /// Specular return where the waves roughen the sea, root of the mean square over the mean σ⁰ \[1\]; 0 without them.
+    /// Specular return where the waves roughen the sea: root mean square over the mean σ⁰ \[1\]; 0 without such waves.
     ///
-    /// Few places make it, near the track: it is summed over rays from the ship, the denser the nearer to the track. Behind
-    /// several ships each counts alone.
+    /// Only a few points near the track contribute, so the sum runs over rays from the ship, denser toward the track.
+    /// Several ships count separately.
     pub(crate) fn specular(&self, models: &Models, amplitudes: &Amplitudes<'_>) -> f64 {
         let first = amplitudes.first;
         if first.mean_sigma0() <= 0.0 {
@@ -106,7 +106,7 @@ impl SubpixelWakes {
             let step = track.farthest_astern(image) / RAY_POINTS as f64;
             for n in 0..RAY_POINTS * RAY_POINTS {
                 let astern = step * ((n / RAY_POINTS) as f64 + 0.5);
-                // Tangents 0 to 1 of the angle to the track, evenly in their roots.
+                // Tangents of the angle to the track from 0 to 1, evenly spaced in their square roots.
                 let root = ((n % RAY_POINTS) as f64 + 0.5) / RAY_POINTS as f64;
                 let aside = astern * root * root;
                 let area = step * astern * 2.0 * root / RAY_POINTS as f64;
@@ -119,10 +119,10 @@ impl SubpixelWakes {
         (sum / (rows * columns * image.spacing * image.spacing)).sqrt() / first.mean_sigma0()
     }
 
-    /// Variances xx, xy and yy of the slopes. Velocities smear the image as an acceleration would that defocuses as much: the
-    /// mean square of both is that of one.
+    /// Variances xx, xy and yy of the slopes. Velocities smear the image like an acceleration with the same defocus, which
+    /// is added in quadrature to the acceleration in `fields`.
     ///
-    /// - `smears`: whether velocities count
+    /// - `smears`: whether velocities smear the image
     pub(crate) fn variances(
         &self,
         site: &Site<'_>,
@@ -164,7 +164,9 @@ impl SubpixelWakes {
     }
 }
 
-/// - `change` of σ⁰, relative, and the share of the width of a point that velocities add
+/// Estimated change of the intensity, relative.
+///
+/// - `change` of σ⁰, relative, and the share of a point's width that velocities add
 pub(crate) fn estimate([change, wider]: [f64; 2], amplitudes: &Amplitudes<'_>) -> f64 {
     change * amplitudes.with_contrast() + wider * amplitudes.contrast
 }
@@ -190,7 +192,7 @@ impl Effect for SubpixelWakes {
     }
 }
 
-/// ½∂²σ⁰/∂s² over σ⁰ for variances xx, xy and yy of the slopes, on the calm facet.
+/// ½∂²σ⁰/∂s² with respect to the slopes xx, xy and yy, over σ⁰, on the calm facet.
 fn curvature_of_sigma(backscatter: &Backscatter) -> [f64; 3] {
     let sigma = |x: f64, y: f64| {
         let [bragg, specular] = backscatter.coarse_parts([x * SLOPE_STEP, y * SLOPE_STEP]);

@@ -1,4 +1,4 @@
-//! Swell: plane waves that are added to the sea.
+//! Swell: plane waves added to the sea.
 
 use super::effect::{Effect, NOT_ASKED_FOR, Site, Weight};
 use crate::linear::Amplitudes;

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 #[derive(Debug)]
 pub(crate) struct TurbulentWakes {
-    /// One a ship.
+    /// One wake per ship.
     pub(crate) wakes: Vec<TurbulentWake>,
 }
 
@@ -33,21 +33,23 @@ impl TurbulentWakes {
         }
     }
 
-    /// Root of the mean square of the damping by all wakes over the image.
+    /// Root mean square over the image of the damping by all wakes.
     fn damping(&self, models: &Models) -> f64 {
         if self.wakes.iter().all(|wake| wake.speed == 0.0) {
             return 0.0;
         }
         rms_over(&models.pixels.computed, |place| {
             let of = |wake: &TurbulentWake| wake.damping(wake.track.seen_from_ship(place));
-            // What is left is the product: 1 − (1 − a)(1 − b) = a + b (1 − a).
+            // The remaining shares multiply: 1 − (1 − a)(1 − b) = a + b (1 − a).
             let each = self.wakes.iter().map(of);
             each.fold(0.0, |all, one| all + one * (1.0 - all))
         })
     }
 }
 
-/// - `damping`: root of its mean square over the image
+/// Estimated change of the intensity, relative.
+///
+/// - `damping`: root mean square over the image
 pub(crate) fn estimate(damping: f64, amplitudes: &Amplitudes<'_>) -> f64 {
     damping * amplitudes.first.modulation.bragg_share
 }

@@ -20,28 +20,30 @@ pub(super) struct Point {
     pub(super) log_posterior: f64,
 }
 
-/// Smallest part of a step that is tried (chosen).
+/// Smallest fraction of a step that is tried (chosen).
 const SHORTEST: f64 = 0.05;
 
-/// Smallest gain relative to its prediction with which derivatives are kept (chosen).
+/// Smallest ratio of actual to predicted gain at which derivatives are kept (chosen).
 const TRUSTED: f64 = 0.6;
 
-/// Parts of the change by which all other values follow the place when it moves a pixel along azimuth, and maxima that are looked around from (chosen).
+/// Fractions of the correlated change of the other values that are tried when the ship moves one pixel along azimuth, and largest
+/// number of maxima whose neighbours are searched (chosen).
 const FOLLOWING: [f64; 4] = [0.0, 0.33, 0.67, 1.0];
 const HOPS: usize = 5;
 
-/// Log-likelihood below the highest maximum at which a maximum is no longer looked around from, and below a maximum at which a place beside it is left out (chosen).
+/// Drop in log-likelihood from the highest maximum beyond which a maximum's neighbours are not searched, and drop from a maximum
+/// beyond which a neighbouring place is left out (chosen).
 const BESIDE: f64 = 60.0;
 const FAR: f64 = 160.0;
 
-/// Where an ascent ends.
+/// Stopping criteria of an ascent.
 #[derive(Clone, Copy)]
 pub(super) struct Until {
     /// Largest number of steps.
     pub(super) steps: usize,
-    /// Length of the last step, in standard deviations of the information.
+    /// Length of a step below which the ascent ends, in standard deviations of the information.
     pub(super) small: f64,
-    /// Largest distance between the winds of scene and texture: [`Textures::of`].
+    /// Largest distance between the winds of scene and texture, as in [`Textures::of`].
     pub(super) farther: f64,
 }
 
@@ -60,22 +62,21 @@ pub(super) struct Ascent<'a> {
     pub(super) length: f64,
 }
 
-/// A step of an ascent.
 struct Step {
-    /// Of each parameter.
+    /// Change of each parameter.
     by: Vec<f64>,
     /// Length in standard deviations.
     size: f64,
-    /// First order of what it gains.
+    /// First-order gain in log-posterior.
     rise: f64,
 }
 
-/// Frozen plan of an ascent, with what its last points needed.
+/// Frozen plan of an ascent, and the derivatives that its points share.
 struct Path {
     image: ExpectedImage,
     /// Largest distance between the winds of scene and texture.
     farther: f64,
-    /// Derivatives of the mean image at a point before.
+    /// Derivatives of the mean image at an earlier point.
     directions: Directions,
 }
 
@@ -148,7 +149,6 @@ impl Ascent<'_> {
         })
     }
 
-    /// Log-prior of factors.
     fn log_prior(&self, factors: &Factors) -> f64 {
         let prior = |parameter: &Parameter| {
             let off = match parameter {
@@ -161,15 +161,17 @@ impl Ascent<'_> {
         self.parameters.iter().map(prior).sum()
     }
 
-    /// Ascent from a start.
+    /// Climbs from a start to the nearest maximum.
     pub(super) fn climb(&self, start: Scene, factors: Factors, until: Until) -> Result<Point> {
         let mut path = self.path(&start, until.farther)?;
         let here = self.linearised(&mut path, start, factors, false)?;
         self.ascend(&mut path, here, until)
     }
 
-    /// Maxima pixels apart along azimuth around a maximum, the highest first: short waves are sampled alike a pixel farther along azimuth, so that the
-    /// likelihood has maxima a pixel apart. Those about as likely as the highest are looked around from, too.
+    /// Maxima around a maximum, in descending order of log-posterior.
+    ///
+    /// Short waves have almost the same samples one pixel farther along azimuth, so the likelihood has maxima one pixel apart.
+    /// The neighbours of maxima about as likely as the highest are searched, too.
     pub(super) fn over_pixels(&self, from: Point, until: Until) -> Result<Vec<Point>> {
         let mut known = vec![from];
         let mut done: Vec<Scene> = Vec::new();
@@ -192,7 +194,7 @@ impl Ascent<'_> {
         Ok(known)
     }
 
-    /// Places a pixel along azimuth from a maximum that are about as likely, away from all known maxima.
+    /// Places one pixel along azimuth from a maximum that are about as likely and not at a known maximum.
     fn pixels_beside(&self, here: &Point, known: &[Point]) -> Result<Vec<(Scene, Factors)>> {
         let Some(step) = self.by_pixel(here) else {
             return Ok(Vec::new());
@@ -227,7 +229,7 @@ impl Ascent<'_> {
         Ok(beside)
     }
 
-    /// Step of all parameters with which the likelihood falls least while the ship moves a pixel along azimuth.
+    /// Step of all parameters that lowers the likelihood least while the ship moves one pixel along azimuth.
     fn by_pixel(&self, here: &Point) -> Option<Vec<f64>> {
         let covariance = self.precision(here).inverse()?;
         let is_y = |p: &Parameter| *p == Parameter::Value(Value::Y);
@@ -237,9 +239,9 @@ impl Ascent<'_> {
         Some(steps.collect())
     }
 
-    /// Ascent of at most `steps` steps.
+    /// Ascends by at most `steps` steps.
     ///
-    /// Derivatives cost several images, so they are kept as long as they predict what a step gains.
+    /// Derivatives cost several images, so they are reused as long as they predict the gain of a step.
     fn ascend(
         &self,
         path: &mut Path,
@@ -280,7 +282,7 @@ impl Ascent<'_> {
         point.near.information.slope.clone().plus(&priors)
     }
 
-    /// Covariance of the estimate, (J + Π)⁻¹(V + Π)(J + Π)⁻¹; `None` where the image does not tell.
+    /// Covariance of the estimate, (J + Π)⁻¹(V + Π)(J + Π)⁻¹; `None` where the image does not determine the parameters.
     pub(super) fn covariance(&self, point: &Point) -> Option<Matrix> {
         let inverse = self.precision(point).inverse()?;
         let priors = self.priors.matrix(self.parameters);
@@ -385,12 +387,12 @@ pub(super) fn same_pixel(a: &Scene, b: &Scene) -> bool {
     (Value::Y.of(a) - Value::Y.of(b)).abs() < 0.5 * a.grid.spacing
 }
 
-/// The likeliest first.
+/// Sorts points in descending order of log-posterior.
 pub(super) fn sort(points: &mut [Point]) {
     points.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
 }
 
-/// Log-posterior of the likeliest.
+/// Highest log-posterior.
 pub(super) fn highest(points: &[Point]) -> f64 {
     let each = points.iter().map(|point| point.log_posterior);
     each.fold(f64::NEG_INFINITY, f64::max)
@@ -401,7 +403,7 @@ mod tests {
     use super::*;
     use crate::simulate::simulate;
 
-    /// From a maximum a pixel off, the one at the ship's place is found, and both are kept.
+    /// Starting at a maximum one pixel off, the search finds the one at the ship's place and keeps both.
     #[test]
     fn maxima_a_pixel_apart_are_found_from_each_other() {
         let keys = [

@@ -15,15 +15,15 @@ use serde::Serialize;
 /// Smallest standard deviations of unbiased estimates.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Bound {
-    /// By parameter; infinite where the image does not tell.
+    /// Standard deviation of each parameter; infinite where the image does not determine it.
     pub deviations: Vec<(Parameter, f64)>,
-    /// Mean squared relative change of the image by the wake over the noise, summed over wavenumbers: the squared answer of a
+    /// Squared relative change of the image due to the wake over the noise, summed over wavenumbers: the squared output of a
     /// matched filter.
     pub wake_to_noise: f64,
 }
 
 impl Bound {
-    /// The bound of one parameter.
+    /// Smallest standard deviation of one parameter.
     #[must_use]
     pub fn of(&self, parameter: Parameter) -> f64 {
         let found = self.deviations.iter().find(|(p, _)| *p == parameter);
@@ -31,14 +31,15 @@ impl Bound {
     }
 }
 
-/// The Cramér–Rao bound of parameters of a scene, for an image with its grid, radar and looks.
+/// Cramér–Rao bound on parameters of a scene, for an image with its grid, radar and looks.
 ///
-/// Of the mean image it is that of a Gaussian field with the covariance between all pixels; of the texture's spectrum wavenumbers
-/// are taken as independent. The priors of the nuisance values count. What is not among the parameters is known.
+/// The information in the mean image is that of a Gaussian field with the covariance between all pixels; in the texture's
+/// spectrum, wavenumbers are taken as independent. The priors of the nuisance values are included. Values that are not among the
+/// parameters are taken as known.
 ///
 /// # Errors
 ///
-/// As [`ExpectedImage::new`].
+/// As in [`ExpectedImage::new`].
 pub fn bound(scene: &Scene, parameters: &[Parameter], priors: &Priors) -> Result<Bound> {
     let image = ExpectedImage::new(scene, &values_of(parameters))?;
     let expected = image.at(scene)?;
@@ -76,12 +77,12 @@ pub fn bound(scene: &Scene, parameters: &[Parameter], priors: &Priors) -> Result
     })
 }
 
-/// Steps of conjugate gradients, and the relative residual at which they end.
+/// Largest number of conjugate-gradient steps, and relative residual at which they end.
 const STEPS: usize = 60;
 const RESIDUAL: f64 = 1e-4;
 
-/// Information Dᵀ C⁻¹ D of a Gaussian field about parameters of its mean, C the covariance between all pixels: by conjugate
-/// gradients, preconditioned with the inverse on the torus.
+/// Fisher information Dᵀ C⁻¹ D about parameters of the mean of a Gaussian field, C the covariance between all pixels, by
+/// conjugate gradients preconditioned with the inverse on the torus.
 fn of_mean(torus: &Torus, covariance: &Field, directions: &[Field]) -> Matrix {
     let power: Vec<f32> = torus.spectrum(covariance).iter().map(|v| v.re).collect();
     let floor = 1e-4 * power.iter().copied().fold(0.0, f32::max);
@@ -149,7 +150,7 @@ fn add(to: &mut Field, factor: f64, from: &Field) {
 mod tests {
     use super::*;
 
-    /// White noise of variance v: Dᵀ D/v; and a correlated one against a solution by elimination.
+    /// The information in correlated noise equals the solution by elimination.
     #[test]
     fn information_is_that_of_all_pixels_together() {
         let torus = Torus::new(24);

@@ -1,27 +1,28 @@
-//! Pixels that a ship's echo covers, which the mean image does not describe, and the echo's displacement.
+//! Pixels covered by a ship's echo, which the mean image does not describe, and the echo's displacement.
 
 use super::search::SPEEDS;
 use crate::raster::{Field, Raster};
 use crate::scene::Scene;
 use crate::track::Track;
 
-/// Brightness over the median from which a pixel belongs to an echo: far above speckle of one look and the brightest waves (chosen).
+/// Ratio to the median above which a pixel belongs to an echo: far above single-look speckle and the brightest waves (chosen).
 const BRIGHT: f32 = 40.0;
 
-/// Brightness over the mean image of the wake from which such a pixel is no crest of the wake (chosen): speckle of one look is brighter in 5 of 100,000 pixels.
+/// Ratio to the mean image of the wake above which such a pixel is not a crest of the wake (chosen): single-look speckle is
+/// brighter in 5 of 100,000 pixels.
 const UNEXPLAINED: f64 = 10.0;
 
-/// Distance from such a pixel that is left out \[m\], beside twice the resolution (chosen).
+/// Distance around such a pixel that is masked \[m\], in addition to twice the resolution (chosen).
 const AROUND: f64 = 20.0;
 
-/// Part of the ship's length by which the middle of its echo is off midship: standard deviation (chosen).
+/// Standard deviation of the distance of an echo's middle from midship, as a fraction of the ship's length (chosen).
 const OFF_MIDSHIP: f64 = 0.15;
 
 /// Echoes of an image.
 pub(super) struct Echo {
     columns: usize,
     covered: Vec<bool>,
-    /// Place in the image, (x, y) and brightness of bright pixels.
+    /// Index in the image, (x, y) and brightness of bright pixels.
     bright: Vec<(usize, [f64; 2], f64)>,
     resolution: f64,
 }
@@ -58,11 +59,11 @@ impl Echo {
         }
     }
 
-    /// Velocity of a scene's ship toward the radar by the azimuth displacement of its echo, (y of the echo − y of midship)/(R/V), and its standard deviation [m/s]; `None` without an echo at
-    /// the ship's range.
+    /// Velocity of a scene's ship toward the radar and its standard deviation [m/s], from the azimuth displacement of its echo:
+    /// (y of the echo − y of midship)/(R/V). `None` without an echo at the ship's range.
     ///
-    /// - `deviation` of the ship's y \[m\]
-    /// - `mean` image that explains the wake: bright crests are no echoes
+    /// - `deviation`: standard deviation of the ship's y \[m\]
+    /// - `mean`: image that explains the wake, so that bright crests are not mistaken for echoes
     pub(super) fn radial_velocity(
         &self,
         scene: &Scene,
@@ -106,7 +107,8 @@ impl Echo {
 mod tests {
     use super::*;
 
-    /// A pixel of 60 times the sea is an echo where the mean image has a crest of twice the sea, and none where it has one of 30 times.
+    /// A pixel 60 times as bright as the sea is an echo where the mean image has a crest of twice the sea, but not where the
+    /// crest is 30 times as bright.
     #[test]
     fn a_crest_that_the_mean_image_has_is_no_echo() {
         let keys = [

@@ -1,4 +1,4 @@
-//! Ship and wind from an image and a sighting of the wake.
+//! Estimates of ship and wind from an image and a sighting of the wake.
 
 use super::echo::Echo;
 use super::observed::Observed;
@@ -19,42 +19,45 @@ use crate::track::Track;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// Answers from which the likelihood is maximised.
+/// Largest number of answers from which the likelihood is maximised.
 const CANDIDATES: usize = 4;
 
-/// Part of the best answer's gain by which an answer may be worse and is still followed, by the part of the wake near the ship and by the whole wake,
-/// and the difference of log-likelihood that is not enough to leave it (chosen).
+/// Fractions of the best answer's gain by which another answer may be worse and is still followed, for the part of the wake near
+/// the ship and for the whole wake, and difference of log-likelihood up to which no answer is dropped (chosen).
 const NEAR_WORSE: f64 = 0.5;
 const WORSE: f64 = 0.25;
 const SURE: f64 = 20.0;
 
-/// Transverse wavelength below which several speeds are about equally likely \[m\] (of ships up to 6.6 m/s; measured on simulated scenes).
+/// Transverse wavelength below which several speeds are about equally likely \[m\] (ships up to 6.6 m/s; measured on simulated
+/// scenes).
 const SHORTEST: f64 = 28.0;
 
-/// Relative error of the mean brightness beside the wake, besides that of the calibration (chosen).
+/// Relative error of the mean brightness beside the wake, in addition to the calibration error (chosen).
 const BRIGHTNESS: f64 = 0.03;
 
-/// Width of the edge of the wedge that the wind is not estimated in \[deg\].
+/// Width of the soft edge of the wedge that is excluded from the wind estimate \[deg\].
 const SOFT: f64 = 20.0;
 
 /// Maximum-likelihood estimate of ship and wind around a sighting, at any speed from 3.5 to 17 m/s.
 ///
-/// The wind follows from brightness and texture beside the wake. A matched filter of mean images searches for speed, heading and place within 2.5 standard deviations of the sighting, first
-/// with the part of the wake near the ship, then with all of it. Fisher scoring maximises the likelihood from the best answers; error bars and tests are those of [`refine`](super::refine).
+/// The wind follows from brightness and texture beside the wake. A matched filter of mean images searches for speed, heading and
+/// place within 2.5 standard deviations of the sighting, first with the part of the wake near the ship, then with the whole wake.
+/// Fisher scoring maximises the likelihood from the best answers; error bars and tests are as in [`refine`](super::refine).
 ///
-/// - `image`: intensity with speckle, in the unit of σ⁰, `[rows, columns]` of the scene's grid. Echoes of ships are left out
-/// - `known`: radar, grid and water, and one ship with the hull that is assumed; its speed, heading and position and the wind's direction do not count,
-///   and the wind's speed only for an uncalibrated image
+/// - `image`: intensity with speckle, in units of σ⁰, `[rows, columns]` of the scene's grid; echoes of ships are masked
+/// - `known`: radar, grid and water, and one ship with the assumed hull; the ship's speed, heading and position and the wind's
+///   direction are ignored, and the wind's speed is used only for an uncalibrated image
 /// - `sighting`: place and heading of the wake
 /// - `priors`: calibration of the brightness and knowledge of the texture
 ///
 /// # Errors
 ///
-/// A sighting with a value that is no number or a deviation of 0, or as [`refine`](super::refine).
+/// A sighting with a value that is not finite or a deviation of 0, or as in [`refine`](super::refine).
 ///
 /// # Validity
 ///
-/// As [`refine`](super::refine). Deep water. Ships slower than 6.6 m/s are never identifiable: their waves are many and faint, and a wrong speed can be about as likely as the right one.
+/// As in [`refine`](super::refine). Deep water. Ships slower than 6.6 m/s are never reported as identifiable: their waves are
+/// many and faint, and a wrong speed can be about as likely as the right one.
 pub fn estimate(
     image: &Field,
     known: &Scene,
@@ -78,7 +81,7 @@ pub fn estimate(
     let searches: Vec<WithWind<'_>> = likely(&winds, 45.0).into_iter().map(with_wind).collect();
     let near = searches.iter().enumerate().map(|(n, one)| one.near_ship(n));
     let near = near.collect::<Result<Vec<_>>>()?.concat();
-    // Once from the answers near the ship, then from the best of all.
+    // First from the answers near the ship, then from the best of all.
     let whole = with_whole_wake(&searches, &of_each_speed(near), true)?;
     let whole = with_whole_wake(&searches, &apart(whole), false)?;
     let best = apart(whole);
@@ -115,7 +118,7 @@ impl<'a> WithWind<'a> {
         }
     }
 
-    /// Answers of the part of the wake near the ship.
+    /// Answers from the part of the wake near the ship.
     fn near_ship(&self, search: usize) -> Result<Vec<Answer>> {
         let found = self.search.near_ship()?.into_iter();
         let answers = found.map(|found| self.answer(found, search));
@@ -136,7 +139,7 @@ impl<'a> WithWind<'a> {
     }
 }
 
-/// Better answers near others, by the whole wake.
+/// Improves answers by a search around them with the whole wake.
 fn with_whole_wake(
     searches: &[WithWind<'_>],
     answers: &[Answer],
@@ -153,13 +156,13 @@ fn with_whole_wake(
 #[derive(Clone, Copy)]
 struct Answer {
     found: Found,
-    /// Place of its search in the list.
+    /// Index of its search.
     search: usize,
-    /// Of wind and wake.
+    /// Log-likelihood of wind and wake.
     log_likelihood: f64,
 }
 
-/// The best answer of each range of speeds, without those that gain much less than the best of all.
+/// Best answer in each range of speeds, without answers that gain much less than the best of all.
 fn of_each_speed(mut answers: Vec<Answer>) -> Vec<Answer> {
     let range = |answer: &Answer| (answer.found.course.speed.ln() / DRAWN) as i32;
     sort(&mut answers);
@@ -173,7 +176,7 @@ fn of_each_speed(mut answers: Vec<Answer>) -> Vec<Answer> {
     kept
 }
 
-/// The best answers that are no neighbours, without those that gain less than the best.
+/// Best answers that are not neighbours, without answers that gain much less than the best.
 fn apart(mut answers: Vec<Answer>) -> Vec<Answer> {
     sort(&mut answers);
     let mut kept: Vec<Answer> = Vec::new();
@@ -187,13 +190,13 @@ fn apart(mut answers: Vec<Answer>) -> Vec<Answer> {
     kept
 }
 
-/// The likeliest first.
+/// Sorts answers in descending order of log-likelihood.
 fn sort(answers: &mut [Answer]) {
     answers.sort_by(|a, b| b.log_likelihood.total_cmp(&a.log_likelihood));
 }
 
 impl Answer {
-    /// True if the log-likelihood is below that of the best answer by more than a part of its gain.
+    /// True if the log-likelihood is below that of the best answer by more than a fraction of its gain and more than [`SURE`].
     fn is_worse(&self, best: Option<&Self>, part: f64) -> bool {
         best.is_some_and(|best| {
             self.log_likelihood < best.log_likelihood - (part * best.found.gain).max(SURE)

@@ -15,11 +15,11 @@ pub(super) struct Information {
     pub(super) variance: Matrix,
 }
 
-/// Terms of score and information.
+/// Terms of the score and the information.
 pub(super) struct Sums<'a> {
     pub(super) torus: &'a Torus,
     pub(super) taper: &'a Taper,
-    /// F[w ∂ln μ] over the spread of the noise by each parameter.
+    /// F[w ∂ln μ] over the spread of the noise, for each parameter.
     pub(super) spectra: &'a [Spectrum],
     /// Power of the noise in the window, and its derivative by each parameter that changes it.
     pub(super) power: Vec<f32>,
@@ -27,7 +27,7 @@ pub(super) struct Sums<'a> {
 }
 
 impl Sums<'_> {
-    /// Σw² over the number of wavenumbers.
+    /// Σw² divided by the number of wavenumbers.
     pub(super) fn scale(&self) -> f64 {
         self.taper.energy / (self.torus.size * self.torus.size) as f64
     }
@@ -51,9 +51,7 @@ impl Sums<'_> {
         (0..spectra.len()).map(one).collect()
     }
 
-    /// J, and V as if wavenumbers were independent.
-    ///
-    /// Second the part of J that comes from the spectrum.
+    /// Returns J, V with wavenumbers taken as independent, and the part of J that comes from the spectrum.
     pub(super) fn information(&self) -> (Information, Matrix) {
         let Self {
             power, by, spectra, ..
@@ -102,7 +100,7 @@ impl Sums<'_> {
         (information, of_power)
     }
 
-    /// V with the covariance between all pixels.
+    /// V from the covariance between all pixels.
     pub(super) fn variance(&self, covariance: &Field) -> Matrix {
         let Self {
             torus,

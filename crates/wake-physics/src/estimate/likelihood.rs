@@ -1,7 +1,7 @@
 //! The likelihood of an image given a scene, to second order.
 //!
-//! Relative intensity r = I/μ − 1 has a covariance that is the same everywhere ([`super::noise`]). Seen through a window w its
-//! spectrum R = F[w r] has the power S = E|R|², and wavenumbers are taken as independent (Whittle):
+//! Relative intensity r = I/μ − 1 has a covariance that is the same everywhere ([`super::noise`]). In a window w, its spectrum R
+//! = F[w r] has the power S = E|R|², and wavenumbers are taken as independent (Whittle):
 //!
 //! ```text
 //! ln L = −½ c Σ (|R|²/S + ln S) − Σ w² ln μ,       c = Σw²/P²   on a torus of P² pixels
@@ -9,11 +9,11 @@
 //! score of the spectrum  g = ½ c Σ (∂ln S)(|R|²/S − 1)
 //! ```
 //!
-//! r and ∂ln μ are divided by the spread of the noise, which is larger where waves of the sea move bright sources beside dark ones; it is fixed at one scene.
-//! The scores have the mean 0 whenever mean and covariance are right: Gamma speckle and a sea that is not Gaussian change no
-//! more than their variances. The variance V of the score of the mean is computed with the covariance between all pixels, not
-//! from the approximation; that of the spectrum is the Gaussian one. Standard deviations are those of J⁻¹VJ⁻¹
-//! (Godambe), J the expected slope of the score.
+//! r and ∂ln μ are divided by the spread of the noise, which is larger where waves of the sea move bright sources next to dark
+//! ones; it is fixed at one scene. The scores have mean 0 whenever mean and covariance are right: Gamma speckle and a sea that is
+//! not Gaussian change only their variances. The variance V of the score of the mean is computed with the covariance between all
+//! pixels, without the approximation; the variance of the spectrum's score is the Gaussian one. Standard deviations are those of
+//! J⁻¹VJ⁻¹ (Godambe), with J the expected slope of the score.
 //!
 //! # References
 //!
@@ -53,18 +53,18 @@ pub struct Likelihood {
     texture: Texture,
 }
 
-/// What an image says of a scene.
+/// Log-likelihood, score and information of an image at a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Score {
-    /// ln likelihood, but for a constant of the image.
+    /// Log-likelihood, up to a constant of the image.
     pub log_likelihood: f64,
-    /// Its slope by each parameter: mean 0 over images of the scene.
+    /// Derivative of the log-likelihood by each parameter; mean 0 over images of the scene.
     pub score: Vec<f64>,
     /// Expected slope J of the score, row after row.
     pub information: Vec<f64>,
-    /// Variance V of the score, row after row: that of an estimate is J⁻¹VJ⁻¹.
+    /// Variance V of the score, row after row; the covariance of an estimate is J⁻¹VJ⁻¹.
     pub variance: Vec<f64>,
-    /// Power of the residual over its expectation by rings of wavenumbers, the longest waves first: 1 where the scene explains the
+    /// Power of the residual over its expectation in rings of wavenumbers, longest waves first; 1 where the scene explains the
     /// image.
     pub power: Vec<f64>,
 }
@@ -74,7 +74,7 @@ impl Likelihood {
     ///
     /// # Errors
     ///
-    /// As [`ExpectedImage::new`].
+    /// As in [`ExpectedImage::new`].
     pub fn new(scene: &Scene, parameters: &[Parameter]) -> Result<Self> {
         let image = ExpectedImage::new(scene, &values_of(parameters))?;
         Ok(Self {
@@ -85,16 +85,19 @@ impl Likelihood {
         })
     }
 
-    /// Draws an image of the likelihood's own law: the mean image times a Gaussian sea and Gamma speckle, with the spread of the noise. Intensity with speckle in the
-    /// unit of σ⁰, `[rows, columns]` of the scene's grid; the same seed gives the same image. Use it to tell errors of an estimator from errors of the law.
+    /// Draws an image from the likelihood's own distribution: the mean image times a Gaussian sea and Gamma speckle, with the
+    /// spread of the noise.
+    ///
+    /// Returns intensity with speckle in units of σ⁰, `[rows, columns]` of the scene's grid; the same seed gives the same image.
+    /// Use it to separate errors of an estimator from errors of the model.
     ///
     /// # Validity
     ///
-    /// Up to second order: values that the Gaussian sea would make negative are 0.
+    /// Up to second order: values that the Gaussian sea would make negative are set to 0.
     ///
     /// # Errors
     ///
-    /// A radar with an impulse response along range: its speckle is correlated, and is not drawn.
+    /// A radar with an impulse response along range: its speckle would be correlated, which is not implemented.
     pub fn draw(&self, seed: u64) -> Result<Field> {
         let radar = &self.scene.radar;
         if let Some(resolution) = radar.range_resolution {
@@ -120,11 +123,11 @@ impl Likelihood {
         Ok(image)
     }
 
-    /// Reads an image of intensity with speckle, in the unit of σ⁰ times the gain.
+    /// Evaluates an image of intensity with speckle, in units of σ⁰ times the gain.
     ///
     /// # Errors
     ///
-    /// An image of another size than the grid, one that holds a value that is negative or no number, or factors that are.
+    /// An image whose size differs from the grid's, a pixel that is negative or not finite, or a factor out of its range.
     pub fn of(&self, image: &Field, factors: &Factors) -> Result<Score> {
         let conflict = |name: &str, value: String, requirement: &str| {
             Err(Error::Conflict {
@@ -146,7 +149,11 @@ impl Likelihood {
         let Factors { gain, texture } = *factors;
         if !(gain.is_finite() && gain > 0.0 && texture.is_finite() && texture >= 0.0) {
             let value = format!("gain {gain}, texture {texture}");
-            return conflict("factors", value, "but they are finite and not negative");
+            return conflict(
+                "factors",
+                value,
+                "but a gain is positive and a texture not negative",
+            );
         }
         let observed = Observed::new(image.clone(), &self.scene, |_, _| 1.0);
         let near = observed.near(

@@ -29,7 +29,7 @@ impl Matrix {
         self
     }
 
-    /// A M A of symmetric matrices.
+    /// Product A M A of symmetric matrices.
     pub(super) fn around(&self, middle: &Self) -> Self {
         let n = self.size;
         let mut out = Self::zero(n);
@@ -43,8 +43,8 @@ impl Matrix {
         out
     }
 
-    /// The inverse of a positive definite matrix, by Cholesky's decomposition of the one with diagonal 1; `None` where a
-    /// pivot is below 1e-10: some direction of the values is not determined at all.
+    /// Inverse of a positive definite matrix, by Cholesky decomposition of the matrix scaled to diagonal 1; `None` where a pivot
+    /// is below 1e-10, which leaves some direction of the values undetermined.
     pub(super) fn inverse(&self) -> Option<Self> {
         let n = self.size;
         let scale: Vec<f64> = (0..n).map(|i| self.at(i, i).sqrt().recip()).collect();

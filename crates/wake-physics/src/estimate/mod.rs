@@ -1,12 +1,13 @@
-//! What an image tells of the values of its scene.
+//! Estimates of a scene's values from an image, with their uncertainty.
 //!
 //! ```text
 //! scene ─► expected image and derivatives ─┬─► likelihood, score and information of an image ─► estimate near a guess
 //!      └─► covariance of sea and speckle ──┴─► bounds, without any image
 //! ```
 //!
-//! [`expected_with_derivatives`] is the mean image of a scene with its derivatives, [`Likelihood`] reads an image with it,
-//! [`estimate`] searches for ship and wind around a sighting, [`refine`] near a guess, and [`bound`] says how well any estimate can know ship and wind.
+//! [`expected_with_derivatives`] computes the mean image of a scene with its derivatives, [`Likelihood`] compares an image with
+//! it, [`estimate`] searches for ship and wind around a sighting, [`refine`] maximises the likelihood near a guess, and [`bound`]
+//! gives the smallest standard deviations of unbiased estimates.
 
 mod ascent;
 mod bound;

@@ -1,11 +1,12 @@
-//! What lies around the expected image: the sea and the speckle, as a stationary field of relative intensity.
+//! Deviations from the expected image: sea and speckle, as a stationary field of relative intensity.
 //!
 //! ```text
 //! I = μ (1 + s) n,     r = I/μ − 1,     cov r(d) = c_s(d) + (1 + c_s(d)) ρ²(d)/N
 //! ```
 //!
-//! with s the open sea by the nonlinear transform ([`sea`]), n the speckle of N looks (Gamma, mean 1), ρ² the correlation of its
-//! intensity by the radar's impulse response, 1 at the distance 0 alone without one.
+//! where s is the open sea by the nonlinear transform ([`sea`]), n the speckle of N looks (Gamma, mean 1), and ρ² the correlation
+//! of the speckle's intensity by the radar's impulse response. Without an impulse response, ρ² is 1 at distance 0 and 0
+//! elsewhere.
 
 use super::sea;
 use super::torus::Torus;
@@ -20,13 +21,13 @@ use rand_distr::{Distribution, StandardNormal};
 #[derive(Debug, Clone)]
 pub(super) struct Noise {
     pub(super) size: usize,
-    /// Of the sea.
+    /// Covariance of the sea.
     sea: Vec<f32>,
-    /// Correlation of the speckle over the looks.
+    /// Correlation of the speckle, divided by the looks.
     speckle: Vec<f32>,
 }
 
-/// Independent looks of a scene's image.
+/// Equivalent number of looks of a scene's image.
 pub(super) fn equivalent_looks(scene: &Scene) -> f64 {
     let radar = &scene.radar;
     if radar.range_resolution.is_none() {
@@ -54,7 +55,7 @@ impl Noise {
         })
     }
 
-    /// Adds a part of the change from one sea to another.
+    /// Adds a fraction of the change from one sea to another.
     pub(super) fn add_change(&mut self, part: f32, from: &Self, to: &Self) {
         let changes = to.sea.iter().zip(&from.sea).map(|(to, from)| to - from);
         for (value, change) in self.sea.iter_mut().zip(changes) {
@@ -62,7 +63,7 @@ impl Noise {
         }
     }
 
-    /// A Gaussian sea of the covariance.
+    /// Draws a Gaussian sea with this covariance.
     pub(super) fn drawn(&self, size: [usize; 2], seed: u64) -> Field {
         let torus = Torus::new(self.size);
         let mut random = generator(seed, Stream::Sea, 0);
@@ -83,21 +84,21 @@ impl Noise {
         self.field(self.sea.iter().copied())
     }
 
-    /// Share of the sea in the variance of a pixel, that of its speckle included.
+    /// Share of the sea in the variance of a pixel, including its product with the speckle.
     pub(super) fn share_of_sea(&self) -> f64 {
         let [sea, speckle] = [&self.sea, &self.speckle].map(|c| f64::from(c[0]));
         let by_sea = sea * (1.0 + speckle);
         by_sea / (by_sea + speckle)
     }
 
-    /// Covariance with the sea's variance times a factor.
+    /// Covariance with the sea's variance multiplied by a factor.
     pub(super) fn covariance(&self, factor: f64) -> Field {
         let pairs = self.sea.iter().zip(&self.speckle);
         let factor = factor as f32;
         self.field(pairs.map(|(sea, speckle)| factor * sea + (1.0 + factor * sea) * speckle))
     }
 
-    /// Its derivative by the logarithm of the factor.
+    /// Derivative of the covariance by the logarithm of the factor.
     pub(super) fn by_factor(&self, factor: f64) -> Field {
         let pairs = self.sea.iter().zip(&self.speckle);
         let factor = factor as f32;
@@ -136,7 +137,7 @@ fn correlations(scene: &Scene, size: usize) -> [Vec<f64>; 2] {
     })
 }
 
-/// A window over the image, with what its shape does to spectra.
+/// A window over the image, and its effects on spectra.
 #[derive(Debug, Clone)]
 pub(super) struct Taper {
     pub(super) weights: Field,
@@ -152,7 +153,7 @@ pub(super) struct Taper {
 const EDGE: f64 = 1.0 / 32.0;
 
 impl Taper {
-    /// A window that falls to 0 at the border of the image, times `shown` of the row and column.
+    /// A window that falls to 0 at the border of the image, times `shown` at the row and column.
     pub(super) fn new(
         torus: &Torus,
         [rows, columns]: [usize; 2],
@@ -169,7 +170,7 @@ impl Taper {
         Self::of_weights(torus, [rows, columns], weight)
     }
 
-    /// All of the image.
+    /// A window of 1 over the whole image.
     pub(super) fn flat(torus: &Torus, size: [usize; 2]) -> Self {
         Self::of_weights(torus, size, |_| 1.0)
     }
@@ -198,7 +199,7 @@ impl Taper {
         }
     }
 
-    /// A field seen through the window.
+    /// Multiplies a field by the window.
     pub(super) fn of(&self, values: impl Iterator<Item = f32>) -> Field {
         let weighed = values.zip(&self.weights.values).map(|(v, w)| v * w);
         Field {
@@ -207,7 +208,7 @@ impl Taper {
         }
     }
 
-    /// Expected power |R|² of what has a covariance, seen through the window.
+    /// Expected power |R|² of a field with a given covariance, in the window.
     pub(super) fn power(&self, torus: &Torus, covariance: &Field) -> Vec<f32> {
         let pairs = covariance.values.iter().zip(&self.overlap.values);
         let seen = Field {

@@ -1,4 +1,4 @@
-//! An image and how it is looked at: the likelihood of [`super::likelihood`] with its score and information.
+//! An image with its window: the likelihood of [`super::likelihood`] with its score and information.
 
 use super::expected::Expected;
 use super::information::{Information, Sums};
@@ -12,13 +12,13 @@ use crate::raster::Field;
 use crate::scene::Scene;
 use rayon::prelude::*;
 
-/// An image and how it is looked at.
+/// An image with its window and its kind of residual.
 #[derive(Debug)]
 pub(super) struct Observed {
     pub(super) image: Field,
     pub(super) torus: Torus,
     pub(super) taper: Taper,
-    /// True for residuals ln I/μ less their mean, false for I/μ − 1.
+    /// True for residuals ln I/μ minus their mean, false for I/μ − 1.
     logarithmic: bool,
 }
 
@@ -27,30 +27,31 @@ pub(super) struct Near {
     pub(super) score: Vec<f64>,
     pub(super) log_likelihood: f64,
     pub(super) information: Information,
-    /// The part of the slope that comes from the spectrum.
+    /// Part of the slope that comes from the spectrum.
     pub(super) of_power: Matrix,
-    /// Σ|R|²/S over its expectation, by ring of wavenumbers, with the number of independent ones.
+    /// Σ|R|²/S over its expectation in rings of wavenumbers, and the number of independent wavenumbers in each ring.
     pub(super) rings: Vec<[f64; 2]>,
 }
 
-/// F[w ∂ln μ] over the spread of the noise by each parameter, with that spread.
+/// F[w ∂ln μ] over the spread of the noise for each parameter, and that spread.
 #[derive(Default)]
 pub(super) struct Directions {
     spectra: Vec<Spectrum>,
     spread: Field,
 }
 
-/// Relative intensity whose logarithm stands for all darker pixels (chosen): of four looks, 8 pixels of a million are darker.
+/// Smallest relative intensity whose logarithm is used (chosen); darker pixels are set to it. With four looks, 8 pixels in a
+/// million are darker.
 const DARKEST: f32 = 0.03;
 
-/// Largest contrast of sources that makes noise: that of darker pixels makes no more.
+/// Largest contrast of sources that adds noise; the higher contrast of darker pixels is clipped to it.
 const CONTRAST: f32 = 8.0;
 
-/// Rings of wavenumbers that the fit is looked at in.
+/// Number of rings of wavenumbers in which the fit is checked.
 pub(super) const RINGS: usize = 8;
 
 impl Observed {
-    /// - `shown`: weight of the row and column, 0 where the image is to be left out
+    /// - `shown`: weight by row and column, 0 where the image is masked
     pub(super) fn new(image: Field, scene: &Scene, shown: impl Fn(usize, usize) -> f64) -> Self {
         let torus = Torus::new(sea::period(scene));
         Self {
@@ -61,7 +62,8 @@ impl Observed {
         }
     }
 
-    /// The same image with logarithms as residuals: their noise does not depend on the mean image, so that the likelihood has fewer maxima far from the best.
+    /// The same image with logarithms as residuals. Their noise does not depend on the mean image, so the likelihood has fewer
+    /// maxima far from the best.
     pub(super) fn logarithmic(&self) -> Self {
         Self {
             image: self.image.clone(),
@@ -71,7 +73,8 @@ impl Observed {
         }
     }
 
-    /// Standard deviation of the noise of each pixel over that of open sea: waves that move bright sources beside dark ones make more noise.
+    /// Standard deviation of each pixel's noise relative to open sea. It is larger where waves move bright sources next to dark
+    /// ones.
     pub(super) fn spread(&self, contrast: &Field, noise: &Noise) -> Field {
         let share = match self.logarithmic {
             true => 0.0,
@@ -99,7 +102,7 @@ impl Observed {
         self.taper.of(pairs.map(|(i, m)| i / (gain * m) - 1.0))
     }
 
-    /// Values less their mean in the window, seen through it.
+    /// Values minus their mean in the window, times the window.
     fn without_mean(&self, values: Vec<f32>) -> Field {
         let weights = &self.taper.weights.values;
         let (mut sum, mut total) = (0.0, 0.0);
@@ -111,7 +114,7 @@ impl Observed {
         self.taper.of(values.into_iter().map(|v| v - mean))
     }
 
-    /// Mean of the image over that of a mean image, in the window.
+    /// Ratio of the image's mean to the mean of a mean image, in the window.
     pub(super) fn gain(&self, mean: &Field) -> f64 {
         let pairs = self.image.values.iter().zip(&mean.values);
         let weighed = pairs.zip(&self.taper.weights.values);
@@ -121,7 +124,7 @@ impl Observed {
         above / below
     }
 
-    /// ln L of a noise around a mean image with the brightness of the image.
+    /// Log-likelihood of noise around a mean image that is scaled to the brightness of the image.
     pub(super) fn log_likelihood_of(&self, noise: &Noise, mean: &Field) -> f64 {
         let gain = self.gain(mean) as f32;
         let left = self.torus.spectrum(&self.residual(gain, mean));
@@ -134,7 +137,7 @@ impl Observed {
         )
     }
 
-    /// Power of noise of a covariance.
+    /// Power of noise with a given covariance, in the window.
     pub(super) fn power(&self, covariance: &Field) -> Vec<f32> {
         let power = self.taper.power(&self.torus, covariance);
         let floor = 1e-6 * power.iter().copied().fold(0.0, f32::max);
@@ -159,7 +162,7 @@ impl Observed {
         }
     }
 
-    /// The same with the directions of a scene nearby.
+    /// As [`Self::near`], with the directions of a nearby scene.
     pub(super) fn near_by(
         &self,
         parameters: &[Parameter],
@@ -184,7 +187,7 @@ impl Observed {
         }
     }
 
-    /// With the variance of the score by the covariance between all pixels.
+    /// Adds the variance of the score from the covariance between all pixels.
     pub(super) fn with_variance(
         &self,
         mut near: Near,
@@ -198,7 +201,7 @@ impl Observed {
         near
     }
 
-    /// Terms of score and information.
+    /// Terms of the score and the information.
     fn sums<'a>(
         &'a self,
         parameters: &[Parameter],
@@ -220,7 +223,7 @@ impl Observed {
         }
     }
 
-    /// ln L alone, likewise.
+    /// Log-likelihood alone, with the directions of a nearby scene.
     pub(super) fn log_likelihood_by(
         &self,
         factors: &Factors,
@@ -236,7 +239,7 @@ impl Observed {
         self.log_likelihood(self.scale(), &left, &power, gain, scales)
     }
 
-    /// Σw² over the number of wavenumbers.
+    /// Σw² divided by the number of wavenumbers.
     fn scale(&self) -> f64 {
         self.taper.energy / (self.torus.size * self.torus.size) as f64
     }
@@ -263,7 +266,7 @@ impl Observed {
         Directions { spectra, spread }
     }
 
-    /// The same image without a taper.
+    /// The same image with a window of 1.
     pub(super) fn whole(&self) -> Self {
         let torus = Torus::new(self.torus.size);
         let size = [self.image.rows, self.image.columns];
@@ -275,7 +278,7 @@ impl Observed {
         }
     }
 
-    /// w ∂ln μ over the spread by each parameter.
+    /// w ∂ln μ over the spread, for each parameter.
     pub(super) fn directions(
         &self,
         parameters: &[Parameter],
@@ -352,7 +355,7 @@ impl Observed {
     }
 }
 
-/// A field over another one.
+/// Quotient of two fields.
 fn over(mut field: Field, by: &Field) -> Field {
     let pixels = field.values.iter_mut().zip(&by.values);
     pixels.for_each(|(value, by)| *value /= by);

@@ -5,7 +5,7 @@ use crate::estimate::priors::values_of;
 use crate::estimate::value::Value;
 use crate::simulate::Simulator;
 
-/// Images that are drawn.
+/// Number of images drawn.
 const SEEDS: u64 = 200;
 
 fn scene() -> Scene {
@@ -20,7 +20,7 @@ fn scene() -> Scene {
     Scene::default().with_assignments(&keys).unwrap()
 }
 
-/// Mean of each score over its stated standard deviation, and its mean square over the stated variance, for images of seeds.
+/// For each score, the mean over its stated standard deviation and the mean square over its stated variance, over all seeds.
 fn scores(scene: &Scene, mut image: impl FnMut(u64) -> Field) -> Vec<[f64; 2]> {
     let parameters = Parameter::OF_WAKE;
     let expected = ExpectedImage::new(scene, &values_of(&parameters)).unwrap();
@@ -54,15 +54,16 @@ fn scores(scene: &Scene, mut image: impl FnMut(u64) -> Field) -> Vec<[f64; 2]> {
     sums.iter().zip(&stated).map(of).collect()
 }
 
-/// Over images of the model (mean image, Gaussian sea and Gamma speckle with their spread) every score has the mean 0, and the variance that is stated.
+/// Over images of the model (mean image, Gaussian sea and Gamma speckle with their spread), every score has mean 0 and the stated
+/// variance.
 #[test]
 fn scores_have_mean_zero_and_the_stated_variance() {
     let scene = scene();
     let likelihood = Likelihood::new(&scene, &Parameter::OF_WAKE).unwrap();
     let found = scores(&scene, |seed| likelihood.draw(seed).unwrap());
     for (parameter, [mean, square]) in Parameter::OF_WAKE.iter().zip(found) {
-        // A mean of 200 standard normal numbers has the deviation 0.07, their mean square 0.1. The spectrum's score knows no kurtosis
-        // of speckle.
+        // The mean of 200 standard normal numbers has standard deviation 0.07, their mean square 0.1. The spectrum's score
+        // ignores the kurtosis of speckle.
         let allowed = match parameter {
             Parameter::Value(Value::WindSpeed | Value::WindToward) | Parameter::Texture => 0.6,
             _ => 0.35,
@@ -73,8 +74,9 @@ fn scores_have_mean_zero_and_the_stated_variance() {
     }
 }
 
-/// Over images of the simulator, whose sea is not Gaussian, a score of ship or wind is off by less than half its deviation: the bias of an
-/// estimate from such an image (docs/physics/estimate.md). Waves of the ship are noise that the covariance has by its spread alone.
+/// Over images of the simulator, whose sea is not Gaussian, the mean score of ship or wind is below half its standard deviation.
+/// This is the bias of an estimate from such an image (docs/physics/estimate.md). The ship's waves add noise to the covariance
+/// only through its spread.
 #[test]
 fn scores_of_simulated_images_are_off_by_less_than_their_deviation() {
     let scene = scene();
@@ -86,7 +88,7 @@ fn scores_of_simulated_images_are_off_by_less_than_their_deviation() {
     });
     for (parameter, [mean, square]) in Parameter::OF_WAKE.iter().zip(found) {
         println!("{parameter:?}: {mean:.3} {square:.3}");
-        // Nuisance values take up what mean and power are off by.
+        // The nuisance values absorb errors of mean and power.
         if parameter.is_nuisance() {
             continue;
         }
@@ -96,8 +98,8 @@ fn scores_of_simulated_images_are_off_by_less_than_their_deviation() {
     }
 }
 
-/// The covariance of simulated seas without ships: power of speckled images by rings of wavenumbers over its expectation, from low to high wind, at
-/// incidences where the return is specular, and where the sea hardly moves.
+/// Power of speckled images of simulated seas without ships over its expectation, in rings of wavenumbers: low to high wind,
+/// incidences with specular return, and a small R/V.
 #[test]
 fn power_of_simulated_seas_is_that_of_the_nonlinear_transform() {
     for keys in [
@@ -145,7 +147,7 @@ fn power_of_simulated_seas_is_that_of_the_nonlinear_transform() {
         }
         println!("{keys:?} {rings:.3?}");
         for [ratio, count] in rings {
-            // Scatter of squares of normal numbers, and what waves modulate beyond the first order.
+            // Scatter of squared normal numbers, and modulation beyond the first order.
             assert!(
                 (ratio - 1.0).abs() < 3.0 * (2.0 / count).sqrt() + 0.08,
                 "{keys:?}: {ratio}"

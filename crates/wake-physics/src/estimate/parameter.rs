@@ -1,4 +1,4 @@
-//! What an image tells of: scene values, the size of the ship, and nuisance values of the image.
+//! Parameters estimated from an image: scene values, the size of the ship, and nuisance values of the image.
 
 use super::value::Value;
 use serde::Serialize;
@@ -9,7 +9,7 @@ use serde::Serialize;
 pub enum Parameter {
     /// Length of the ship \[m\], its beam and draft in proportion.
     Size,
-    /// Logarithm of a factor on the image: calibration, and what the mean image is wrong by.
+    /// Logarithm of a factor on the image, for calibration and for errors of the mean image.
     Gain,
     /// Logarithm of a factor on the variance of the sea's texture.
     Texture,
@@ -19,7 +19,7 @@ pub enum Parameter {
 }
 
 impl Parameter {
-    /// What a wake in an image is asked for.
+    /// Parameters that are estimated from a wake in an image.
     pub const OF_WAKE: [Self; 9] = [
         Self::Value(Value::Speed),
         Self::Value(Value::Heading),
@@ -32,7 +32,7 @@ impl Parameter {
         Self::Texture,
     ];
 
-    /// Its name in reports.
+    /// Name in reports.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -51,7 +51,7 @@ impl Parameter {
         }
     }
 
-    /// Its unit; of the factors' logarithms 1.
+    /// Unit; empty for the logarithms of factors.
     #[must_use]
     pub fn unit(self) -> &'static str {
         match self {
@@ -62,7 +62,7 @@ impl Parameter {
         }
     }
 
-    /// Whether it is one of the ship.
+    /// Whether the parameter belongs to the ship.
     #[must_use]
     pub fn is_of_ship(self) -> bool {
         match self {
@@ -72,13 +72,13 @@ impl Parameter {
         }
     }
 
-    /// Whether it is a factor on the image, not a value of the scene.
+    /// Whether the parameter is a factor on the image, not a value of the scene.
     #[must_use]
     pub fn is_nuisance(self) -> bool {
         matches!(self, Self::Gain | Self::Texture)
     }
 
-    /// Scene values that it changes.
+    /// Scene values that the parameter changes.
     pub(super) fn values(self) -> &'static [Value] {
         match self {
             Self::Value(value) => match Value::ALL.iter().position(|v| *v == value) {
@@ -91,7 +91,7 @@ impl Parameter {
     }
 }
 
-/// Factors on what a scene makes: nuisance values of an image.
+/// Factors on the image of a scene: nuisance values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Factors {
     /// Factor on the mean image \[1\], above 0: its logarithm is [`Parameter::Gain`].
@@ -101,7 +101,7 @@ pub struct Factors {
 }
 
 impl Default for Factors {
-    /// The scene as it is.
+    /// Factors of 1.
     fn default() -> Self {
         Self {
             gain: 1.0,

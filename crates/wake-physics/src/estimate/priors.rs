@@ -1,16 +1,16 @@
-//! What is known beforehand of the nuisance values.
+//! Prior knowledge of the nuisance values.
 
 use super::matrix::Matrix;
 use super::parameter::Parameter;
 use super::value::Value;
 
-/// Standard deviations of what is known beforehand of the nuisance values.
+/// Prior standard deviations of the nuisance values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Priors {
-    /// Of the logarithm of the factor on the image: calibration of the radar and error of the mean image. Infinite for an image
-    /// that is not calibrated.
+    /// Standard deviation of the logarithm of the factor on the image: calibration of the radar and error of the mean image.
+    /// Infinite for an image that is not calibrated.
     pub gain: f64,
-    /// Of the logarithm of the factor on the variance of the texture: how far the theory of the sea is trusted.
+    /// Standard deviation of the logarithm of the factor on the texture's variance: uncertainty of the theory of the sea.
     pub texture: f64,
 }
 
@@ -42,7 +42,7 @@ impl Priors {
     }
 }
 
-/// Values that derivatives are needed by.
+/// Values by which derivatives are needed.
 pub(super) fn values_of(parameters: &[Parameter]) -> Vec<Value> {
     let mut values: Vec<Value> = parameters
         .iter()

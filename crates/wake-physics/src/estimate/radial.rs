@@ -1,4 +1,4 @@
-//! Radial velocity of the ship, from the displacement of its echo, as further evidence.
+//! Conditions an estimate on the ship's radial velocity, from the displacement of its echo.
 
 use super::parameter::Parameter;
 use super::refined::Estimate;
@@ -23,12 +23,15 @@ impl Estimate {
         [velocity, variance.max(0.0).sqrt()]
     }
 
-    /// The estimate with a measured radial velocity of the ship, from the displacement of its echo: R/V times the velocity.
+    /// Conditions the estimate on a measured radial velocity of the ship, from the displacement of its echo: R/V times the
+    /// velocity.
     ///
-    /// All values follow by their covariance, to first order (Kalman 1960), and alternatives by their own radial velocities. The estimate is not identifiable if the two differ by more than 4
-    /// standard deviations. The echo moves over ground, the wake in the water: add the velocity of a possible current to the deviation.
+    /// All values are updated by their covariance, to first order (Kalman 1960), and alternatives are reweighted by their own
+    /// radial velocities. The estimate is not identifiable if estimated and measured velocity differ by more than 4 standard
+    /// deviations. The echo moves over ground, the wake in the water: add the velocity of a possible current to the deviation.
     ///
-    /// - `velocity` toward the radar [m/s], with its standard deviation, above 0
+    /// - `velocity`: velocity toward the radar [m/s]
+    /// - `deviation`: standard deviation of the velocity [m/s], above 0
     ///
     /// # References
     ///
@@ -86,7 +89,7 @@ impl Estimate {
         (self.covariance.len() == count * count).then_some((slope, count))
     }
 
-    /// Covariance of a value and what has a slope.
+    /// Covariance of a value with the quantity that has the given slope.
     fn spread(&self, slope: &[f64], row: usize) -> f64 {
         let line = &self.covariance[row * slope.len()..][..slope.len()];
         line.iter().zip(slope).map(|(c, s)| c * s).sum()
@@ -138,7 +141,8 @@ mod tests {
         }
     }
 
-    /// Along range only the speed counts: the mean of both speeds, weighed by their precisions, and the heading by its covariance.
+    /// Along range, the radial velocity determines the speed: it becomes the mean of both speeds weighted by their precisions,
+    /// and the heading follows by its covariance.
     #[test]
     fn speeds_are_weighed_by_their_precisions() {
         // −5.2 m/s toward the radar is 10.4 m/s along range at sin 30°; 0.1 m/s is 0.2 m/s.
@@ -160,7 +164,7 @@ mod tests {
         assert!(!estimate().with_radial_velocity(5.0, 0.2).identifiable);
     }
 
-    /// The prediction is within its deviation of itself.
+    /// A ship of 10 ± 0.2 m/s along range moves at −5 ± 0.1 m/s toward a radar at 30° incidence.
     #[test]
     fn the_radial_velocity_is_that_of_the_ship() {
         let [velocity, deviation] = estimate().radial_velocity();

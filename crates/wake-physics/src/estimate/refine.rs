@@ -1,4 +1,4 @@
-//! Maximum-likelihood estimate near a guess: ascents from starts to the highest maximum.
+//! Maximum-likelihood estimate near a guess: ascents from several starts to the highest maximum.
 
 use super::ascent::{Ascent, Point, Until, highest, sort};
 use super::echo::Echo;
@@ -19,7 +19,8 @@ use crate::models::Models;
 use crate::raster::Field;
 use crate::scene::{Scene, Sea};
 
-/// Ends of an ascent, of the first ascent with a wind, of the ship before it, and of places a pixel away.
+/// Stopping criteria of the last ascent, of the first ascent with a wind, of the ship's ascent before it, and of ascents one
+/// pixel away.
 const END: Until = Until {
     steps: 20,
     small: 0.1,
@@ -41,10 +42,10 @@ const PIXEL: Until = Until {
     farther: 0.25,
 };
 
-/// Log-likelihood below the highest from which a maximum is looked at no further (chosen).
+/// Drop in log-likelihood from the highest maximum beyond which a maximum is not followed further (chosen).
 const POSSIBLE: f64 = 300.0;
 
-/// Ships that the wind is fitted to.
+/// Number of ships for which the wind is fitted.
 const FOLLOWED: usize = 2;
 
 /// Starts around a guess: relative changes of the speed and changes of the heading \[deg\], about the width of a maximum.
@@ -58,27 +59,30 @@ const AROUND: [[f64; 2]; 5] = [
 
 /// Maximum-likelihood estimate of ship and wind near a guess.
 ///
-/// Fisher scoring maximises the likelihood from five starts around the guess, then again from the opposite wind and from places a pixel away. Standard deviations are those of the
-/// information times a factor for the error of the model (1.2 to 3.5, chosen). They also contain the values at the other maxima, by their probability: those of ship and wind at places a
-/// pixel away, and those of the ship with another wind, which shifts the wake otherwise.
+/// Fisher scoring maximises the likelihood from five starts around the guess, then again from the opposite wind and from places
+/// one pixel away. Standard deviations are those of the information times a factor for the error of the model (1.2 to 3.5,
+/// chosen). They also include the spread over other maxima, weighted by probability: values of ship and wind at places one pixel
+/// away, and values of the ship with another wind, which shifts the wake differently.
 ///
-/// The estimate is identifiable if the residual power is within 25 % and three standard deviations of the model's, the factors on brightness and texture agree with their priors (3 and 2
-/// standard deviations of prior and estimate together), the ship raises the log-likelihood by more than 20, the standard deviation of the speed is below 15 %, and the probability of other speeds below 5 %.
+/// The estimate is identifiable if the residual power is within 25 % and three standard deviations of the model's, the factors on
+/// brightness and texture agree with their priors (within 3 and 2 standard deviations of prior and estimate combined), the ship
+/// raises the log-likelihood by more than 20, the standard deviation of the speed is below 15 %, and the probability of other
+/// speeds is below 5 %.
 ///
-/// - `image`: intensity with speckle, in the unit of σ⁰, `[rows, columns]` of the scene's grid
+/// - `image`: intensity with speckle, in units of σ⁰, `[rows, columns]` of the scene's grid
 /// - `guess`: known radar, grid and water, and a guess of ship and wind
 /// - `priors`: calibration of the brightness and knowledge of the texture
 ///
 /// # Errors
 ///
-/// An image of another size than the grid or with a value that is negative or no number, a scene without exactly one ship, or as
-/// [`ExpectedImage::new`](super::ExpectedImage::new).
+/// An image whose size differs from the grid's, a pixel that is negative or not finite, a scene without exactly one ship, or as
+/// in [`ExpectedImage::new`](super::ExpectedImage::new).
 ///
 /// # Validity
 ///
-/// Start within 1 % of the speed, 1 degree of the heading, and a tenth of the transverse wavelength (2πU²/g) of the position. Farther starts can converge to another
-/// maximum with similar standard deviations; [`estimate`](super::estimate) searches for the start. One ship on a straight track. The mean image has the limits of
-/// [`Likelihood`](super::Likelihood).
+/// Start within 1 % of the speed, 1 degree of the heading, and a tenth of the transverse wavelength (2πU²/g) of the position.
+/// Starts farther away can converge to another maximum with similar standard deviations; [`estimate`](super::estimate) searches
+/// for the start. One ship on a straight track. The mean image has the limits of [`Likelihood`](super::Likelihood).
 pub fn refine(image: &Field, guess: &Scene, priors: &Priors) -> Result<Estimate> {
     check(image, guess)?;
     let echo = Echo::of(image, guess);
@@ -119,9 +123,9 @@ pub(super) fn check(image: &Field, guess: &Scene) -> Result<()> {
     Ok(())
 }
 
-/// Highest maximum that is reached from the starts, with its alternatives.
+/// Highest maximum reached from the starts, with its alternatives.
 ///
-/// - `seas`: other seas that the likeliest ship is tried on
+/// - `seas`: other seas on which the likeliest ship is tried
 pub(super) fn settled(
     observed: &Observed,
     starts: &[Scene],
@@ -147,7 +151,7 @@ pub(super) fn settled(
         parameters: &of_ship,
         ..ascent
     };
-    // The ship first, with the brightness of the image and the wind of the start: what they explain wrongly would be explained as texture.
+    // The ship first, with the brightness of the image and the wind of the start: errors of the ship would be fitted as texture.
     let mut ships = Vec::new();
     for start in starts {
         ships.push(with_wind.climb(start.clone(), as_bright(observed, start)?, SHIP)?);
@@ -168,7 +172,7 @@ pub(super) fn settled(
     }
     sort(&mut points);
     let Point { scene, factors, .. } = points.swap_remove(0);
-    // Waves of the sea shift a wake: with the opposite wind its ship is elsewhere.
+    // Waves of the sea shift a wake, so the ship is elsewhere with the opposite wind.
     for turned in [0.0, 180.0] {
         let mut sea = scene.sea.clone();
         sea.wind_toward = (sea.wind_toward + turned).rem_euclid(360.0);
@@ -189,7 +193,7 @@ pub(super) fn settled(
     concluded(&ascent, points, open)
 }
 
-/// The scene on a sea, its ship where that sea puts the wake that the image shows.
+/// The scene on another sea, with its ship moved to where that sea would put the wake of the image.
 fn on_sea(observed: &Observed, scene: &Scene, sea: Sea) -> Result<Scene> {
     let mut other = scene.clone();
     other.sea = sea;
@@ -235,7 +239,7 @@ fn shift(scene: &Scene) -> f64 {
     models.range_to_velocity * waves.sum::<f64>()
 }
 
-/// Factors that give a scene the brightness of the image.
+/// Factors that scale a scene to the brightness of the image.
 fn as_bright(observed: &Observed, scene: &Scene) -> Result<Factors> {
     let mean = ExpectedImage::new(scene, &[])?.intensity(scene)?;
     Ok(Factors {

@@ -36,7 +36,7 @@ pub struct Alternative {
 pub struct Estimate {
     /// Maximum-likelihood scene.
     pub scene: Scene,
-    /// Its mean image, in the unit of the estimated image.
+    /// Mean image of this scene, in the unit of the estimated image.
     pub mean: Field,
     /// Estimated values, in the order of [`Parameter::OF_WAKE`].
     pub values: Vec<Estimated>,
@@ -52,7 +52,8 @@ pub struct Estimate {
     pub over_open_sea: f64,
     /// Power of the residual over its expectation in rings of wavenumbers, longest waves first; 1 for a perfect model.
     pub power: Vec<f64>,
-    /// Velocity of the ship toward the radar by the displacement of its echo alone, and its standard deviation [m/s]; [`estimate`](super::estimate) uses it.
+    /// Velocity of the ship toward the radar and its standard deviation [m/s], from the displacement of its echo alone; used by
+    /// [`estimate`](super::estimate).
     pub by_echo: Option<[f64; 2]>,
     /// True if the estimate passes the tests of [`refine`](super::refine).
     pub identifiable: bool,
@@ -74,10 +75,11 @@ impl Estimate {
     }
 }
 
-/// Smallest log-likelihood ratio of a certain wake: fitting ten values to noise gains about 10 (chosen).
+/// Smallest log-likelihood ratio of a certain wake (chosen): fitting ten values to noise gains about 10.
 pub(super) const CERTAIN: f64 = 20.0;
 
-/// Largest acceptable misfit, and largest factors on brightness and texture in standard deviations of prior and estimate together (chosen).
+/// Largest acceptable misfit, and largest logarithms of the factors on brightness and texture in standard deviations of prior and
+/// estimate combined (chosen).
 const EXPLAINED: f64 = 1.25;
 const USUAL: [f64; 2] = [3.0, 2.0];
 
@@ -93,7 +95,8 @@ pub(super) fn no_start() -> Error {
     }
 }
 
-/// Factor on the standard deviation of the information: errors of mean and covariance (chosen, from errors of 23 simulated scenes outside the evaluation).
+/// Factor on the standard deviation of the information, for errors of mean and covariance (chosen, from errors of 23 simulated
+/// scenes outside the evaluation).
 fn model_error(parameter: Parameter) -> f64 {
     match parameter {
         Parameter::Texture => 3.5,
@@ -104,16 +107,17 @@ fn model_error(parameter: Parameter) -> f64 {
     }
 }
 
-/// Factor on the difference of log-likelihood between maxima: the likelier of two opposite winds, or of two places a pixel apart, can be the wrong one (chosen).
+/// Factor on the difference of log-likelihood between maxima (chosen): the likelier of two opposite winds, or of two places one
+/// pixel apart, can be wrong.
 const BELIEVED: f64 = 0.05;
 
-/// Estimate from maxima, the highest one first.
+/// Estimate from maxima in descending order of log-posterior.
 pub(super) fn concluded(ascent: &Ascent<'_>, points: Vec<Point>, open: f64) -> Result<Estimate> {
     let mut points = points.into_iter();
     let first = points.next().ok_or_else(no_start)?;
     let top = first.log_posterior;
     let best = ascent.point(first.scene, first.factors)?;
-    // Maxima of the same speed and wind, some pixels apart, and all others.
+    // Maxima of the same speed and wind some pixels apart, and all other maxima.
     let mut beside: Vec<Alternative> = Vec::new();
     let mut others: Vec<Alternative> = Vec::new();
     for point in points {
@@ -192,7 +196,7 @@ pub(super) fn concluded(ascent: &Ascent<'_>, points: Vec<Point>, open: f64) -> R
     Ok(found)
 }
 
-/// Makes weights beside that of the best maximum, 1, a probability each; returns their sum.
+/// Turns weights relative to the best maximum's, 1, into probabilities; returns the sum of all weights.
 fn normalise(others: &mut [Alternative]) -> f64 {
     let total = 1.0 + others.iter().map(|other| other.weight).sum::<f64>();
     for other in others {
@@ -202,7 +206,8 @@ fn normalise(others: &mut [Alternative]) -> f64 {
     total
 }
 
-/// Difference of a value at another maximum, for values of the ship of the same speed, for those of the wind of the same wind; 0 for all others.
+/// Difference of a value at another maximum: for values of the ship if the speed is the same, for values of the wind if speed and
+/// wind are the same; 0 otherwise.
 fn away(parameter: Parameter, best: &Point, other: &Alternative) -> f64 {
     let counts = match parameter.is_of_ship() {
         true => !is_other_speed(&best.scene, &other.scene),
@@ -224,7 +229,7 @@ fn away(parameter: Parameter, best: &Point, other: &Alternative) -> f64 {
 
 /// Tests of [`refine`](super::refine).
 fn is_identifiable(found: &Estimate, best: &Point, priors: &Priors) -> bool {
-    // Of a factor in standard deviations of its prior and of its estimate together.
+    // Compares a factor with the standard deviations of its prior and its estimate combined.
     let is_usual = |parameter: Parameter, prior: f64, limit: f64| {
         let [value, deviation] = found.of(parameter);
         value.abs() < limit * prior.hypot(deviation)
@@ -247,7 +252,7 @@ fn is_identifiable(found: &Estimate, best: &Point, priors: &Priors) -> bool {
         && doubt < DOUBT
 }
 
-/// The scene with directions from 0 to 360 degrees.
+/// The scene with directions wrapped to 0 to 360 degrees.
 fn wrapped(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
     scene.sea.wind_toward = scene.sea.wind_toward.rem_euclid(360.0) % 360.0;
@@ -257,7 +262,8 @@ fn wrapped(scene: &Scene) -> Scene {
     scene
 }
 
-/// Relative difference below which two speeds are the same, and above which they are fringes apart: a fringe is a transverse wavelength over twice the wake's length, some 4 %.
+/// Relative difference below which two speeds are the same, and above which they are fringes apart: a fringe is a transverse
+/// wavelength over twice the wake's length, some 4 %.
 const SAME_SPEED: f64 = 0.005;
 const OTHER_SPEED: f64 = 0.02;
 

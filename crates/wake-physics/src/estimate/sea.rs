@@ -1,6 +1,8 @@
-//! Covariance of the imaged open sea by the nonlinear transform: brightness and velocity bunching in full, range bunching to first order.
+//! Covariance of the imaged open sea by the nonlinear transform: brightness and velocity bunching in full, range bunching to
+//! first order.
 //!
-//! Sources of relative strength e^m are displaced by s in azimuth and by d in range. m, s and d are Gaussian, so in closed form
+//! Sources of relative strength e^m are displaced by s in azimuth and by d in range. As m, s and d are Gaussian, the spectrum has
+//! a closed form:
 //!
 //! ```text
 //! P(k) = q² T²(k) Σ_r e^{−ik·r} [ W(r) {1 + i kx (Δ_d(r) + i ky Q(r))} − e^{−ky²σ²} ]
@@ -9,14 +11,15 @@
 //! g(r) = (1 + ½ vᵀHv)(1 + ½ uᵀHu) + vᵀHCHu + ½ tr HCHC,     v = ⟨∇ζ(x + r) m(x)⟩,     u = v(−r),     C = ⟨∇ζ(x + r) ∇ζ(x)ᵀ⟩
 //! ```
 //!
-//! m: tilt and hydrodynamic modulation to first order; H: second derivatives of ln σ⁰ by the slopes, those along x and y; T: azimuth smear of
-//! unresolved waves, the share of sources between two pixels, and impulse response; q²: square of the share of the intensity that waves modulate. The
-//! terms of first order in ρ are the quasi-linear spectrum of [`LinearSea`](crate::simulate::LinearSea).
+//! m: tilt and hydrodynamic modulation to first order; H: second derivatives of ln σ⁰ by the slopes along x and y; T: azimuth
+//! smear of unresolved waves, sharing of sources between two pixels, and impulse response; q²: square of the share of the
+//! intensity that waves modulate. The terms of first order in ρ are the quasi-linear spectrum of
+//! [`LinearSea`](crate::simulate::LinearSea).
 //!
 //! # References
 //!
-//! Hasselmann and Hasselmann (1991), J. Geophys. Res. 96(C6), 10713; Krogstad (1992), J. Geophys. Res. 97(C2), 2421 (velocity bunching in full, modulation
-//! to second order).
+//! Hasselmann and Hasselmann (1991), J. Geophys. Res. 96(C6), 10713; Krogstad (1992), J. Geophys. Res. 97(C2), 2421 (velocity
+//! bunching in full, modulation to second order).
 
 use super::torus::Torus;
 use crate::dispersion::angular_frequency;
@@ -36,12 +39,12 @@ use num_complex::{Complex32, Complex64};
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
-/// Pixels of a period of the covariance of a grid.
+/// Period of the covariance for a scene's grid \[pixels\].
 pub(super) fn period(scene: &Scene) -> usize {
     fast_length(scene.grid.rows.max(scene.grid.columns) + GUARD)
 }
 
-/// Number of the sums that they are made of.
+/// Number of sums from which the covariances are computed.
 const SUMS: usize = 10;
 
 /// Covariances of brightness and displacement by distance, `[period, period]`, displacements in pixels.
@@ -50,24 +53,24 @@ struct Correlations {
     period: usize,
     /// Logarithm of the mean product of two brightnesses.
     brightness: Vec<f64>,
-    /// Displacement in azimuth.
+    /// Covariance of the displacement in azimuth.
     displacement: Vec<f64>,
-    /// Largest one of each row.
+    /// Largest covariance of the displacement in each row.
     largest: Vec<f64>,
-    /// ρ(r) − ρ(−r) of brightness and displacement in azimuth, then in range.
+    /// ρ(r) − ρ(−r) of brightness and displacement, in azimuth and in range.
     moving: [Vec<f64>; 2],
     /// 2ρ(0) − ρ(r) − ρ(−r) of displacements in range and azimuth.
     apart: Vec<f64>,
 }
 
-/// Smallest factor on the mean product of brightnesses: a second-order sum has no lower bound.
+/// Smallest factor on the mean product of brightnesses, as a second-order sum has no lower bound.
 const SMALLEST_FACTOR: f64 = 1e-3;
 
-/// Exponents below which a pair of pixels counts as independent.
+/// Exponent below which a pair of pixels counts as independent.
 const INDEPENDENT: f64 = -16.0;
 
 impl Correlations {
-    /// - `of`: modulation, displacement in azimuth and in range and slopes along x and y of each wave
+    /// - `of`: modulation, displacements in azimuth and in range, and slopes along x and y of each wave
     /// - `curvature`: second derivatives of ln σ⁰ by the slopes
     fn new(
         variances: &[f32],
@@ -139,8 +142,8 @@ impl Correlations {
         }
     }
 
-    /// Σ over rows of the brackets times e^{i ky i}, for each column of the half plane: the real and imaginary part of the bracket without kx, and of
-    /// the factor of i kx.
+    /// Sums over rows of the brackets times e^{i ky i}, for each column of the half plane: real and imaginary parts of the
+    /// bracket without kx and of the factor of i kx.
     ///
     /// - `ky` [rad/pixel]
     fn line(&self, ky: f64) -> [Vec<f64>; 4] {
@@ -190,8 +193,8 @@ fn turns(angle: f64) -> u32 {
     (part * 4_294_967_296.0) as i32 as u32
 }
 
-/// Covariance \[1\] of the relative intensity of the open sea of a scene before speckle by distance in rows and columns,
-/// `[period, period]`, negative distances from the end.
+/// Covariance \[1\] of the relative intensity of a scene's open sea before speckle, by distance in rows and columns, `[period,
+/// period]`, with negative distances at the end.
 ///
 /// # Errors
 ///
@@ -216,7 +219,7 @@ pub(super) fn covariance(scene: &Scene) -> Result<Field> {
     let averaged = open.averaged(&models);
     let transfer = open.modulation_of(&averaged);
     let wavenumber = |n: usize| signed_index(n, period) as f64 * step;
-    // Toward column 0 is toward the radar, toward row 0 toward larger y.
+    // Column 0 is nearest the radar, row 0 at the largest y.
     let lean = -1.0 / (models.incidence.tan() * spacing);
     let elevation: f64 = variances.iter().map(|v| f64::from(*v)).sum();
     let correlations = Correlations::new(&variances, period, curvature_of(&averaged), |n| {
@@ -284,7 +287,7 @@ pub(super) fn covariance(scene: &Scene) -> Result<Field> {
     for (n, (value, slope)) in spectrum.iter_mut().zip(&slope).enumerate() {
         let [ky, kx] = [wavenumber(n / period), wavenumber(n % period)];
         // Waves at half the sampling rate have no odd part.
-        // The torus has e^{+i kx x}.
+        // The torus uses e^{+i kx x}.
         let odd = if 2 * (n % period) == period {
             0.0
         } else {
@@ -303,9 +306,9 @@ pub(super) fn covariance(scene: &Scene) -> Result<Field> {
     Ok(field)
 }
 
-/// Mean of d(1 − d), d the part of a Gaussian displacement that lies between two pixels: a source there is shared by both.
+/// Mean of d(1 − d), where d is the fraction of a Gaussian displacement between two pixels, which share the source.
 ///
-/// - `variance` of the displacement [pixel²]
+/// - `variance`: variance of the displacement [pixel²]
 fn between_pixels(variance: f64) -> f64 {
     let term = |n: i32| {
         let square = (PI * f64::from(n)).powi(2);

@@ -1,13 +1,14 @@
 //! Coarse search for speed, heading and place around a sighting: a matched filter of mean images.
 //!
-//! The logarithm t of the relative change of the mean image by a wake is correlated with the whitened image v at all places at once,
+//! The logarithm t of the relative change of the mean image by a wake is correlated with the whitened image v at all places at
+//! once,
 //!
 //! ```text
 //! v = w Σw² F⁻¹[R/S],     a(p) = Σ v(x) t(x − p),     E = c Σ |F[t]|²/S,     gain = a²/(2E)
 //! ```
 //!
-//! the log-likelihood that a wake of unknown strength adds. First only the part of the wake near the ship counts: there it has few wavelengths,
-//! so a step of the speed may be large. Then the whole wake counts, near the best answers.
+//! the log-likelihood added by a wake of unknown strength. The first search uses only the part of the wake near the ship: it
+//! spans few wavelengths, so the step of the speed may be large. The second uses the whole wake, near the best answers.
 
 use super::noise::Noise;
 use super::observed::Observed;
@@ -22,24 +23,25 @@ use crate::track::direction;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// A wake, and how much more likely it makes the image.
+/// A wake, and its gain in log-likelihood.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Found {
     pub(super) course: Course,
     /// Midship at the time of the image.
     pub(super) place: [f64; 2],
-    /// Log-likelihood that it adds.
+    /// Log-likelihood that the wake adds, with the prior of the sighting.
     pub(super) gain: f64,
 }
 
-/// Range of the speeds [m/s], and the largest relative step.
+/// Range of speeds [m/s], and largest relative step of the speed.
 pub(super) const SPEEDS: [f64; 2] = [3.5, 17.0];
 const STEP: f64 = 0.03;
 
-/// Relative step of the speeds at which a wake is drawn; those between follow by similarity.
+/// Relative step between speeds at which a wake is drawn; wakes between them follow by similarity.
 pub(super) const DRAWN: f64 = 0.08;
 
-/// Part of the wake that counts first: transverse waves across a disc, range of its diameter \[m\], and its middle astern of midship over the diameter.
+/// Part of the wake used first: transverse waves across a disc, range of its diameter \[m\], and distance of its middle astern of
+/// midship over the diameter.
 const WAVES: f64 = 18.0;
 const NEAR: [f64; 2] = [300.0, 700.0];
 const ASTERN: f64 = 0.38;
@@ -47,16 +49,16 @@ const ASTERN: f64 = 0.38;
 /// Step of the headings times the length of the wake [deg m].
 const TURN: f64 = 1125.0;
 
-/// Distance that a wake is searched within around an answer, in transverse waves.
+/// Radius within which a wake is searched around an answer, in transverse wavelengths.
 const WAVES_AWAY: f64 = 1.2;
 
 /// Tolerance of drawn wakes.
 const TOLERANCE: f64 = 0.05;
 
-/// Pixels around the image that wakes are drawn on.
+/// Margin around the image on which wakes are drawn \[pixels\].
 const MARGIN: usize = 20;
 
-/// Places that are searched \[m\].
+/// Disc of places to search \[m\].
 #[derive(Clone, Copy)]
 struct Disc {
     middle: [f64; 2],
@@ -106,7 +108,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Answers of the part of the wake near the ship, one for each speed and heading.
+    /// Answers from the part of the wake near the ship, one for each speed and heading.
     pub(super) fn near_ship(&self) -> Result<Vec<Found>> {
         let drawn = ((SPEEDS[1] / SPEEDS[0]).ln() / DRAWN).ceil() as i32;
         let step = (SPEEDS[1] / SPEEDS[0]).ln() / f64::from(drawn);
@@ -118,7 +120,7 @@ impl<'a> Search<'a> {
         Ok(found.collect::<Result<Vec<_>>>()?.concat())
     }
 
-    /// The same for speeds between two, which follow from one drawn wake.
+    /// Answers for speeds between two limits, which follow from one drawn wake.
     fn near_between(&self, speeds: [f64; 2]) -> Result<Vec<Found>> {
         let Sighting {
             heading,
@@ -166,9 +168,9 @@ impl<'a> Search<'a> {
         Ok((0..count).flat_map(best).collect())
     }
 
-    /// Best answer of the whole wake near an answer.
+    /// Best answer with the whole wake near an answer.
     ///
-    /// - `anywhere`: at all places of the sighting, not only around that of the answer
+    /// - `anywhere`: search all places of the sighting, not only places around the answer's
     pub(super) fn whole(&self, found: &Found, anywhere: bool) -> Result<Found> {
         let course = found.course;
         let length = self.length(found);
@@ -183,7 +185,7 @@ impl<'a> Search<'a> {
         self.best_around(found, &each, reach)
     }
 
-    /// Best answer of the whole wake next to an answer with another wind.
+    /// Best answer with the whole wake near an answer for another wind.
     pub(super) fn beside(&self, found: &Found) -> Result<Found> {
         let course = found.course;
         let length = self.length(found);
@@ -205,7 +207,7 @@ impl<'a> Search<'a> {
         corners.map(astern).into_iter().fold(NEAR[0], f64::max)
     }
 
-    /// Best of some courses near an answer by the whole wake.
+    /// Best of several courses near an answer, with the whole wake.
     fn best_around(&self, found: &Found, each: &[Course], reach: f64) -> Result<Found> {
         let Found { course, place, .. } = *found;
         let mut scene = self.scene.clone();
@@ -224,7 +226,7 @@ impl<'a> Search<'a> {
         Ok(best.unwrap_or(*found))
     }
 
-    /// Best of some courses, each at its best place.
+    /// Best of several courses, each at its best place.
     fn best(
         &self,
         courses: &[Course],
@@ -235,7 +237,7 @@ impl<'a> Search<'a> {
         found.max_by(|a, b| a.gain.total_cmp(&b.gain))
     }
 
-    /// Each of some courses at its best place.
+    /// Several courses, each at its best place.
     fn each(
         &self,
         courses: &[Course],
@@ -268,7 +270,7 @@ impl<'a> Search<'a> {
             .collect()
     }
 
-    /// Highest gain of the map of places.
+    /// Answer at the highest gain in a map of places.
     fn peak(&self, course: Course, around: Disc, map: &Field, energy: f64) -> Found {
         let place = around.middle;
         let spacing = self.image.spacing;
@@ -314,7 +316,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// E of a change.
+    /// Energy E of a change.
     fn energy(&self, spectrum: &Spectrum) -> f64 {
         let torus = &self.observed.torus;
         let terms = spectrum.iter().zip(&self.power).enumerate();

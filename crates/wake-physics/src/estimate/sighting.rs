@@ -1,13 +1,13 @@
-//! Place and heading of a wake before it is estimated.
+//! Approximate place and heading of a wake, around which it is estimated.
 
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::track::Track;
 
-/// Place and heading of a wake, from a detector, from the eye, or from the echo of its ship.
+/// Place and heading of a wake, from a detector, by eye, or from the echo of its ship.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sighting {
-    /// Midship (x, y) \[m\] by the wake, at the time of the image.
+    /// Midship (x, y) \[m\] according to the wake, at the time of the image.
     pub place: [f64; 2],
     /// Heading [deg clockwise from azimuth].
     pub heading: f64,
@@ -18,7 +18,7 @@ pub struct Sighting {
 }
 
 impl Sighting {
-    /// Standard deviations that a search covers.
+    /// Half width of a search, in standard deviations.
     pub(super) const REACH: f64 = 2.5;
 
     /// Sighting with standard deviations of 60 m and 3 degrees (chosen for `wake-detector`).

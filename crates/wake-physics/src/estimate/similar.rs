@@ -1,7 +1,8 @@
 //! Relative change of an image by a wake, drawn once and stretched and turned to other speeds and headings.
 //!
-//! In deep water the wakes of all speeds are similar: lengths grow as U². So images of nearby speeds and headings follow from one by a similarity transform about
-//! midship. Amplitudes and the displacement by velocity bunching do not follow it: this is for a search alone.
+//! In deep water the wakes of all speeds are similar: lengths grow as U². Images of nearby speeds and headings therefore follow
+//! from one image by a similarity transform about midship. Amplitudes and the displacement by velocity bunching do not follow it,
+//! so it serves only for a search.
 
 use super::expected::ExpectedImage;
 use crate::error::Result;
@@ -20,9 +21,10 @@ pub(super) struct Course {
 }
 
 impl Course {
-    /// Courses around it.
+    /// Courses on a grid around this course.
     ///
-    /// - `count` on either side, `step`: of the logarithm of the speed and of the heading \[deg\]
+    /// - `count`: number of courses on either side
+    /// - `step`: steps of the logarithm of the speed and of the heading \[deg\]
     pub(super) fn around(self, count: [i32; 2], step: [f64; 2]) -> Vec<Self> {
         let speeds = -count[0]..=count[0];
         let of_speed = |n: i32| {
@@ -36,7 +38,7 @@ impl Course {
 
     /// The scene with its ship on the course.
     ///
-    /// - `midship` (x, y) at the time of the image \[m\]
+    /// - `midship`: (x, y) at the time of the image \[m\]
     pub(super) fn on(self, scene: &Scene, midship: [f64; 2]) -> Scene {
         let mut scene = scene.clone();
         let run = self.speed * scene.sea.time;
@@ -60,8 +62,8 @@ pub(super) struct Drawn {
 impl Drawn {
     /// Draws the wake of the scene's ship.
     ///
-    /// - `scene`: its grid is drawn on
-    /// - `midship` at the time of the image, from the middle of the grid \[m\]
+    /// - `scene`: the wake is drawn on its grid
+    /// - `midship`: (x, y) at the time of the image, from the middle of the grid \[m\]
     /// - `open`: intensity of the open sea
     pub(super) fn new(scene: &Scene, course: Course, midship: [f64; 2], open: f32) -> Result<Self> {
         let scene = course.on(scene, midship);
@@ -78,9 +80,11 @@ impl Drawn {
         })
     }
 
-    /// Change by a ship of another course.
+    /// Change by a ship on another course.
     ///
-    /// - `raster` of the result, `midship` there, `weight` by place relative to midship
+    /// - `raster`: raster of the result
+    /// - `midship`: midship in that raster
+    /// - `weight`: weight by place relative to midship
     pub(super) fn moved(
         &self,
         raster: &Raster,
@@ -147,7 +151,7 @@ mod tests {
         (-(ahead * ahead + port * port) / 800.0).exp()
     }
 
-    /// Similar patterns are moved into each other, up to the error of the interpolation: (spacing/width)³ = 0.008.
+    /// Similar patterns are mapped onto each other, up to the interpolation error (spacing/width)³ = 0.008.
     #[test]
     fn similar_patterns_are_moved_into_each_other() {
         let raster = Raster::image(100, 100, 4.0);

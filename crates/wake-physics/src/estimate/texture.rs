@@ -1,4 +1,4 @@
-//! Covariance of sea and speckle with its derivatives by the wind.
+//! Covariance of sea and speckle, with its derivatives by the wind.
 
 use super::noise::Noise;
 use super::parameter::Parameter;
@@ -13,7 +13,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 #[derive(Debug, Clone)]
 pub(super) struct Texture {
     pub(super) noise: Noise,
-    /// The noise a step farther, by parameter.
+    /// Parameter, noise one step away, and step.
     slopes: Vec<(Parameter, Noise, f64)>,
     /// Wind speed \[m/s\] and direction \[deg\] of the sea.
     wind: [f64; 2],
@@ -46,13 +46,13 @@ impl Texture {
         })
     }
 
-    /// True with derivatives by those of the parameters that belong to the wind.
+    /// True if it has derivatives by all wind parameters among those given.
     fn has_slopes(&self, parameters: &[Parameter]) -> bool {
         let known = |parameter: &Parameter| self.slopes.iter().any(|s| s.0 == *parameter);
         parameters.iter().filter(|p| is_of_wind(p)).all(known)
     }
 
-    /// Distance of the wind of a scene: relative change of the speed, and change of the direction \[deg\].
+    /// Distance to the wind of a scene: relative change of the speed, and change of the direction \[deg\].
     fn to(&self, scene: &Scene) -> [f64; 2] {
         let [speed, toward] = wind_of(scene);
         let turned = (toward - self.wind[1] + 180.0).rem_euclid(360.0) - 180.0;
@@ -78,7 +78,7 @@ impl Texture {
         moved
     }
 
-    /// Derivatives of the covariance.
+    /// Derivative of the covariance by each parameter, `None` where it is not a parameter of the noise.
     pub(super) fn slopes(&self, parameters: &[Parameter], factor: f64) -> Vec<Option<Field>> {
         let of = |parameter: &Parameter| {
             if *parameter == Parameter::Texture {
@@ -105,18 +105,18 @@ fn is_of_wind(parameter: &Parameter) -> bool {
     matches!(parameter, Parameter::Value(value) if !value.is_of_ship())
 }
 
-/// Relative change of the wind speed and change of its direction \[deg\] within which a texture is extrapolated (chosen): its power is then off by
-/// some 0.2 %, at most 0.3 %.
+/// Relative change of the wind speed and change of its direction \[deg\] within which a texture is extrapolated (chosen): the
+/// error of its power is then about 0.2 %, at most 0.3 %.
 const NEAR: [f64; 2] = [0.02, 2.0];
 
-/// Textures of all seas so far.
+/// Cache of the textures of all seas so far.
 #[derive(Debug, Default)]
 pub(super) struct Textures(Mutex<Vec<Arc<Texture>>>);
 
 impl Textures {
-    /// The texture of the sea of a scene, from that of a sea nearby if there is one.
+    /// Texture of a scene's sea, extrapolated from a nearby sea if there is one.
     ///
-    /// - `farther`: largest distance of the wind, in units of [`NEAR`]
+    /// - `farther`: largest distance of the wind for extrapolation, in units of [`NEAR`]
     pub(super) fn of(
         &self,
         scene: &Scene,
@@ -151,7 +151,7 @@ impl Textures {
 mod tests {
     use super::*;
 
-    /// Half as far, the extrapolation is off by a quarter.
+    /// At half the distance, the error of the extrapolation is about a quarter.
     #[test]
     fn textures_of_winds_nearby_are_extrapolated() {
         let keys = ["grid.rows=96", "grid.columns=96", "sea.wind_speed=5"];
@@ -172,7 +172,7 @@ mod tests {
         let [far, near] = [1.0, 0.5].map(off);
         assert!(far < 3e-3 && near < 0.35 * far, "{far:e} {near:e}");
         assert_eq!(textures.0.lock().unwrap().len(), 1);
-        // Farther than that it is computed.
+        // Beyond that distance the texture is computed.
         let mut other = scene;
         other.sea.wind_speed *= 1.0 + 1.1 * NEAR[0];
         textures.of(&other, &parameters, 1.0).unwrap();

@@ -4,7 +4,7 @@ use crate::fft::Synthesis;
 use crate::raster::Field;
 use num_complex::Complex32;
 
-/// Square torus of pixels; a spectrum is its half plane, `[size/2 + 1, size]`: the rest is its conjugate.
+/// Square torus of pixels. A spectrum is its half plane, `[size/2 + 1, size]`; the other half is its conjugate.
 #[derive(Debug)]
 pub(super) struct Torus {
     pub(super) size: usize,
@@ -22,12 +22,12 @@ impl Torus {
         }
     }
 
-    /// Wavenumbers of a spectrum.
+    /// Number of wavenumbers in the half plane.
     pub(super) fn half(&self) -> usize {
         (self.size / 2 + 1) * self.size
     }
 
-    /// How many wavenumbers of the whole plane one of the half plane stands for.
+    /// Number of wavenumbers of the whole plane that one of the half plane represents.
     pub(super) fn weight(&self, n: usize) -> f64 {
         let line = n / self.size;
         if (2 * line).is_multiple_of(self.size) {
@@ -37,7 +37,7 @@ impl Torus {
         }
     }
 
-    /// Spectra of two real fields that fill the torus from its first row and column on.
+    /// Spectra of two real fields that fill the torus from its first row and column.
     pub(super) fn spectra(&self, [a, b]: [&Field; 2]) -> [Spectrum; 2] {
         let size = self.size;
         let mut lines = vec![Complex32::default(); size * size];
@@ -68,7 +68,7 @@ impl Torus {
         spectrum
     }
 
-    /// The real fields of two spectra, of which the first rows and columns are kept.
+    /// Real fields of two spectra, cropped to the first rows and columns.
     pub(super) fn fields(&self, [a, b]: [&Spectrum; 2], keep: [usize; 2]) -> [Field; 2] {
         let size = self.size;
         let mut lines = vec![Complex32::default(); size * size];
@@ -125,7 +125,7 @@ mod tests {
         }
     }
 
-    /// Parseval, and back again, on an even and an odd torus.
+    /// Parseval's theorem and the inverse transform, on an even and an odd torus.
     #[test]
     fn spectra_are_those_of_both_fields() {
         for size in [20, 21] {

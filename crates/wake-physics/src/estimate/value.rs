@@ -1,9 +1,9 @@
-//! Scene values that an image is differentiated by, and that are estimated.
+//! Scene values by which an image is differentiated and which are estimated.
 
 use crate::scene::{Scene, Ship};
 use serde::Serialize;
 
-/// A value of a scene that its mean image is a smooth function of; those of a ship are the first ship's.
+/// A scene value of which the mean image is a smooth function; ship values are the first ship's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Value {
@@ -32,7 +32,7 @@ pub enum Value {
 }
 
 impl Value {
-    /// All of them, in the order of their numbers.
+    /// All values, in the order of their numbers.
     pub const ALL: [Self; 11] = [
         Self::Speed,
         Self::Heading,
@@ -64,7 +64,7 @@ impl Value {
         }
     }
 
-    /// Whether the value is one of the ship.
+    /// Whether the value belongs to the ship.
     #[must_use]
     pub fn is_of_ship(self) -> bool {
         (self as usize) <= Self::Draft as usize
@@ -88,7 +88,7 @@ impl Value {
         }
     }
 
-    /// Sets the value; a ship's value of a scene without a ship changes nothing.
+    /// Sets the value; a ship's value has no effect on a scene without a ship.
     pub fn set(self, scene: &mut Scene, value: f64) {
         match self {
             Self::WindSpeed => scene.sea.wind_speed = value,
@@ -116,7 +116,7 @@ impl Value {
         }
     }
 
-    /// The scene with another value.
+    /// Returns the scene with the value changed by `by`.
     #[must_use]
     pub fn moved(self, scene: &Scene, by: f64) -> Scene {
         let mut moved = scene.clone();
@@ -124,13 +124,13 @@ impl Value {
         moved
     }
 
-    /// Step of the differences of the small stages that have no derivative of their own, in the unit of the value: a few
-    /// thousandths of what the stages change over.
+    /// Step of the differences of small stages without analytic derivatives, in the unit of the value: a few thousandths of the
+    /// scale over which the stages change.
     pub(crate) fn step(self, scene: &Scene) -> f64 {
         let beam = scene.ships.first().map_or(1.0, |ship| ship.beam);
         match self {
             Self::Speed => 2e-3 * self.of(scene).max(0.1),
-            // At half a kilometre as far as a position moves.
+            // At half a kilometre, this moves a point as far as the step of a position.
             Self::Heading => (0.002 * beam / 500.0).to_degrees(),
             Self::X | Self::Y => 0.002 * beam,
             Self::Size | Self::Length | Self::Beam | Self::Draft | Self::WindSpeed => {

@@ -13,7 +13,8 @@ use rayon::prelude::*;
 /// Number of directions, evenly around the circle.
 const DIRECTIONS: usize = 12;
 
-/// Wind speeds [m/s] between which the brightness is bisected: below some 3 m/s it falls with the wind.
+/// Wind speeds [m/s] between which the brightness is bisected, and number of bisections; below some 3 m/s the brightness falls
+/// with the wind.
 const SPEEDS: [f64; 8] = [2.0, 2.5, 3.0, 4.0, 6.0, 9.0, 12.0, 16.0];
 const BISECTIONS: usize = 9;
 
@@ -26,11 +27,11 @@ pub(super) struct Wind {
     pub(super) log_likelihood: f64,
 }
 
-/// Log-likelihood below that of the likeliest wind from which a wind is not followed, and number of followed winds (chosen).
+/// Drop in log-likelihood from the likeliest wind beyond which a wind is not followed, and number of winds followed (chosen).
 const HOPELESS: f64 = 100.0;
 const FOLLOWED: usize = 3;
 
-/// The likeliest winds whose axes are at least `apart` degrees apart: opposite winds draw almost the same wake.
+/// Likeliest winds whose axes are at least `apart` degrees apart, as opposite winds make almost the same wake.
 pub(super) fn likely(winds: &[Wind], apart: f64) -> Vec<&Wind> {
     let mut kept: Vec<&Wind> = Vec::new();
     for wind in winds {
@@ -44,9 +45,10 @@ pub(super) fn likely(winds: &[Wind], apart: f64) -> Vec<&Wind> {
     kept
 }
 
-/// Winds of all directions, each with the speed that gives the brightness of the image, the likeliest first.
+/// Winds of all directions, each with the speed that gives the brightness of the image, in descending order of likelihood.
 ///
-/// - `bright`: mean intensity of the sea and standard deviation of its logarithm; `None` for an uncalibrated image, whose wind speed is that of the scene
+/// - `bright`: mean intensity of the sea and standard deviation of its logarithm; `None` for an uncalibrated image, which keeps
+///   the wind speed of the scene
 pub(super) fn winds(
     observed: &Observed,
     scene: &Scene,
@@ -61,7 +63,7 @@ pub(super) fn winds(
         }
         let mean = ExpectedImage::new(&open, &[])?.intensity(&open)?;
         let noise = Noise::new(&open)?;
-        // No wind of some directions is as bright as the image.
+        // In some directions no wind is as bright as the image.
         let off = bright.map_or(0.0, |[_, deviation]| observed.gain(&mean).ln() / deviation);
         Ok(Wind {
             log_likelihood: observed.log_likelihood_of(&noise, &mean) - 0.5 * off * off,
@@ -76,7 +78,7 @@ pub(super) fn winds(
     Ok(winds)
 }
 
-/// Largest wind speed that gives the brightness, or that of the range that comes nearest.
+/// Largest wind speed that gives the brightness, or else the tabulated speed that comes nearest.
 fn as_bright(scene: &Scene, bright: f64) -> Result<f64> {
     scene.validate()?;
     let over = |speed: f64| {

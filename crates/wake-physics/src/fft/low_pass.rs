@@ -1,4 +1,4 @@
-//! A separable low-pass filter of a complex field, sampled at every n-th pixel.
+//! Separable low-pass filter of a complex field, sampled at every n-th pixel.
 
 use super::fast_length;
 use crate::numeric::vector::vectorized;
@@ -9,22 +9,22 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Rows worked on at once: as many as share the cache lines of a transposed column.
+/// Rows processed at once: as many as share the cache lines of a transposed column.
 const BLOCK: usize = 16;
 
-/// Weights of one axis of a filter at the frequencies −h…h of an FFT: an odd number of them.
+/// Weights of one axis of a filter at the frequencies −h…h of an FFT; their number is odd.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Band(pub(crate) Vec<f32>);
 
 impl Band {
-    /// Highest frequency h, in steps of the FFT.
+    /// Highest frequency h, in frequency steps of the FFT.
     #[must_use]
     pub(crate) fn highest(&self) -> usize {
         self.0.len() / 2
     }
 }
 
-/// A filtered field, up to its last transform.
+/// A filtered field before its last transform.
 pub(crate) struct Filtered {
     lines: Vec<Complex32>,
     window: Window,
@@ -40,30 +40,30 @@ pub(crate) struct Filtered {
 /// The field is continued by zeros to the M × N pixels of the FFT and periodically beyond. Only the frequencies of the
 /// band are computed after the first pass, and only the kept pixels by the last.
 pub(crate) struct LowPass {
-    /// Rows and columns of the FFT: M, N.
+    /// Rows and columns of the FFT, M and N.
     sizes: [usize; 2],
     step: usize,
-    /// Rows and columns.
+    /// Bands of rows and of columns.
     bands: [Band; 2],
-    /// Analysis and synthesis of each axis.
+    /// Forward and inverse transform of each axis.
     transforms: [[Arc<dyn Fft<f32>>; 2]; 2],
 }
 
-/// Which pixels are kept: `start` and number of rows and of columns.
+/// The pixels that are kept: first row and column, and number of rows and columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Window {
-    /// First row and column, of the field.
+    /// First row and column in the field.
     pub(crate) start: [usize; 2],
     /// Number of rows and columns kept.
     pub(crate) keep: [usize; 2],
 }
 
-/// A delta function at a place between the pixels.
+/// A delta function at a position between the pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Point {
-    /// Row and column, with fractions, of the field.
+    /// Row and column in the field, fractional.
     pub(crate) place: [f64; 2],
-    /// Amplitude.
+    /// Complex amplitude.
     pub(crate) amplitude: Complex32,
 }
 
@@ -85,12 +85,12 @@ impl LowPass {
 
     /// Plans a filter.
     ///
-    /// - `sizes`: those of [`Self::sizes`]
+    /// - `sizes`: as returned by [`Self::sizes`]
     /// - `bands`: of rows and of columns
     ///
     /// # Panics
     ///
-    /// If a size is no multiple of the step, or a band is wider than the FFT.
+    /// If a size is not a multiple of the step, or a band is wider than the FFT.
     #[must_use]
     pub(crate) fn new(sizes: [usize; 2], step: usize, bands: [Band; 2]) -> Self {
         let mut planner = FftPlanner::new();
@@ -114,10 +114,10 @@ impl LowPass {
         }
     }
 
-    /// Filters a field of `rows` rows that `fill` writes one by one, and points between its pixels: the kept rows of its band, for
-    /// [`Self::kept_rows`].
+    /// Filters a field of `rows` rows, written one by one by `fill`, together with points between its pixels. Returns the
+    /// kept rows of its band, for [`Self::kept_rows`].
     ///
-    /// - `fill(row, values)`: `values` has the columns of the FFT, all zero
+    /// - `fill(row, values)`: `values` has as many columns as the FFT, all zero
     ///
     /// # Panics
     ///
@@ -143,7 +143,7 @@ impl LowPass {
         }
     }
 
-    /// First pass: transforms each row and keeps its band, `[block][band][BLOCK]`.
+    /// First pass: transforms each row and keeps its band; returns `[block][band][BLOCK]`.
     fn rows_to_band(
         &self,
         rows: usize,
@@ -175,7 +175,7 @@ impl LowPass {
         blocks
     }
 
-    /// Second pass: filters the columns of the band and samples them, `[band][keep_rows]`.
+    /// Second pass: filters the columns of the band and samples them; returns `[band][keep_rows]`.
     fn columns_of_band(
         &self,
         blocks: &[Complex32],
@@ -219,7 +219,7 @@ impl LowPass {
 
     /// Last pass: sums the band of each kept row.
     ///
-    /// `take` is given each of them, and that row of `out`.
+    /// `take` receives each row and the matching row of `out`.
     ///
     /// # Shapes
     ///
@@ -227,7 +227,7 @@ impl LowPass {
     ///
     /// # Panics
     ///
-    /// If `out` has another length.
+    /// If `out` has a different length.
     pub(crate) fn kept_rows<T: Send>(
         &self,
         Filtered { lines, window }: &Filtered,
@@ -269,8 +269,8 @@ impl LowPass {
             );
     }
 
-    /// For each frequency of an axis: its place in the FFT, in the short FFT, and the factor that moves the first kept
-    /// pixel to place 0, with 1/size; of rows the weight too, which the columns have already.
+    /// For each frequency of an axis: its index in the FFT and in the short FFT, and a factor 1/size that moves the first
+    /// kept pixel to index 0; for rows with the weight, which the columns already have.
     fn shifts(&self, axis: usize, start: usize) -> Vec<(usize, usize, Complex32)> {
         let (size, band) = (self.sizes[axis], &self.bands[axis]);
         let count = band.0.len();
@@ -278,7 +278,7 @@ impl LowPass {
         frequencies
             .map(|b| {
                 let at = place(b, count, size);
-                // Whole turns drop out of the product of whole numbers: exact however large.
+                // Whole turns are dropped in integer arithmetic, which is exact for any size.
                 let turns = (at * start % size) as f64 / size as f64;
                 let (sin, cos) = (TAU * turns).sin_cos();
                 let weight = if axis == 0 { f64::from(band.0[b]) } else { 1.0 } / size as f64;
@@ -288,7 +288,7 @@ impl LowPass {
             .collect()
     }
 
-    /// The spectrum of a point: its factors of the frequencies of rows, and of columns with the amplitude and their weights.
+    /// Spectrum of a point: factors by row frequency, and by column frequency with amplitude and weights.
     fn spectrum(&self, point: &Point) -> PointSpectrum {
         let turns = |axis: usize| {
             let (band, size) = (&self.bands[axis], self.sizes[axis] as f64);
@@ -308,7 +308,7 @@ impl LowPass {
 
     /// Adds the spectra of the points to line `b` of the band.
     ///
-    /// - `sums`: room for the real and the imaginary parts of the band
+    /// - `sums`: buffers for the real and the imaginary parts of the band
     fn add_points(
         &self,
         b: usize,
@@ -339,7 +339,7 @@ impl LowPass {
     }
 }
 
-/// Adds a multiple of complex values, their real and imaginary parts apart so that the loop vectorises.
+/// Adds a multiple of complex values, with separate real and imaginary parts so that the loop vectorises.
 #[inline(always)]
 fn add_multiple(
     sum_re: &mut [f32],
@@ -354,20 +354,20 @@ fn add_multiple(
     }
 }
 
-/// Factors of the frequencies of the bands of rows and of columns.
+/// Factors of a point at the frequencies of the row band and of the column band.
 struct PointSpectrum {
-    /// Real parts, and imaginary parts.
+    /// Real parts and imaginary parts.
     rows: (Vec<f32>, Vec<f32>),
     columns: Vec<Complex32>,
 }
 
-/// Places in an FFT of `size` values of a band of `count`: of the negative frequencies, and of the others.
+/// Index ranges of a band of `count` frequencies in an FFT of `size` values: negative frequencies, then the others.
 fn entries(count: usize, size: usize) -> [Range<usize>; 2] {
     let below = count / 2;
     [size - below..size, 0..count - below]
 }
 
-/// Place in an FFT of `size` values of entry `entry` of a band of `count`.
+/// Index in an FFT of `size` values of entry `entry` of a band of `count`.
 fn place(entry: usize, count: usize, size: usize) -> usize {
     (entry + size - count / 2) % size
 }
@@ -376,7 +376,7 @@ fn scratch(transform: &Arc<dyn Fft<f32>>) -> Vec<Complex32> {
     vec![Complex32::ZERO; transform.get_inplace_scratch_len()]
 }
 
-/// Adds the weighted frequencies of a line where sampling puts them.
+/// Adds the weighted frequencies of a line at the indices to which sampling aliases them.
 fn fold(line: &[Complex32], shift: &[(usize, usize, Complex32)], short: &mut [Complex32]) {
     short.fill(Complex32::ZERO);
     for &(from, to, factor) in shift {
@@ -389,7 +389,7 @@ mod tests {
     use super::*;
     use num_complex::Complex64;
 
-    /// The sum of the definition, frequency by frequency, with points as e^{−2πi(a r/M + b c/N)}.
+    /// The defining sum, frequency by frequency, with points as e^{−2πi(a r/M + b c/N)}.
     fn direct(
         plan: &LowPass,
         field: &[Complex32],
@@ -435,7 +435,7 @@ mod tests {
         for (size, step, bands) in [
             ([18, 15], 1, [7, 5]),
             ([37, 20], 2, [9, 11]),
-            // Wider than the kept pixels carry: folded.
+            // Wider than the kept pixels can represent: aliased.
             ([20, 33], 3, [13, 25]),
             ([1, 1], 1, [1, 1]),
         ] {
@@ -474,7 +474,7 @@ mod tests {
                 .sqrt();
             for (found, expected) in out.iter().zip(expected) {
                 let found = Complex64::new(found.re.into(), found.im.into());
-                // Some twenty roundings of f32 on the way, of values up to the largest.
+                // About twenty f32 roundings of values up to the largest.
                 assert!((found - expected).norm() < 4e-6 * rms.max(1.0), "{size:?}");
             }
         }

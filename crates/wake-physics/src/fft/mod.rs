@@ -1,8 +1,8 @@
-//! The only module that calls an FFT: sign, order and normalisation are stated here, once.
+//! FFTs: the only module that calls them, with their sign, order and normalisation.
 //!
 //! # Sign and normalisation
 //!
-//! A synthesis adds plane waves and divides by nothing:
+//! A synthesis adds plane waves without normalisation:
 //!
 //! ```text
 //! f(x, y) = Σ_a Σ_b S[b, a] · exp(i(kx_b·x + ky_a·y)),   kx_b = b·2π/(columns·spacing), ky_a likewise
@@ -28,13 +28,13 @@ use std::sync::Arc;
 /// Rows transposed at once in the second pass.
 const BLOCK: usize = 16;
 
-/// The two precisions a transform can run in; fields are `f32` either way.
+/// The two precisions of a transform; fields are `f32` in either case.
 pub(crate) trait Real: FftNum + Default {
     /// Rounds to `f32`.
     fn to_f32(self) -> f32;
     /// Rounds from `f64`.
     fn from_f64(value: f64) -> Self;
-    /// Blocks for spectra, and the FFTs planned so far, in this precision.
+    /// Buffers for spectra and the planned FFTs in this precision.
     fn of(workspace: &mut Workspace) -> (&mut Shelf<Complex<Self>>, &mut FftPlanner<Self>);
 }
 
@@ -62,7 +62,7 @@ impl Real for f64 {
     }
 }
 
-/// Sums plane waves of a lattice of wavenumbers on a raster, by two passes of one-dimensional FFTs.
+/// Sum of plane waves on a lattice of wavenumbers, evaluated on a raster by two passes of one-dimensional FFTs.
 pub(crate) struct Synthesis<T> {
     rows: usize,
     columns: usize,
@@ -86,20 +86,20 @@ impl<T: Real> Synthesis<T> {
         Self::planned(&mut FftPlanner::new(), rows, columns)
     }
 
-    /// [`Self::new`] by a planner that keeps what it planned.
+    /// [`Self::new`] with a planner that caches its plans.
     pub(crate) fn planned(planner: &mut FftPlanner<T>, rows: usize, columns: usize) -> Self {
         Self {
             rows,
             columns,
-            // Row 0 is the largest y: a growing row index means a falling y, so this direction is "forward".
+            // Row 0 has the largest y: y falls as the row index grows, so this direction is "forward".
             along_y: planner.plan_fft_forward(rows),
             along_x: planner.plan_fft_inverse(columns),
         }
     }
 
-    /// Sums `spectrum` (transposed, see the module page; overwritten) and keeps the first `keep[0]` rows and
-    /// `keep[1]` columns. `finish` may change each row (given its number) before its real part goes to `re`
-    /// and its imaginary part to `im`: two real fields for one transform.
+    /// Sums `spectrum` (transposed, see the module page; overwritten) and keeps the first `keep[0]` rows and `keep[1]`
+    /// columns. `finish` may change each row, given its index, before its real part is written to `re` and its imaginary
+    /// part to `im`: two real fields from one transform.
     ///
     /// # Shapes
     ///
@@ -108,7 +108,7 @@ impl<T: Real> Synthesis<T> {
     ///
     /// # Panics
     ///
-    /// If a length is another, or more is kept than there is.
+    /// If a length does not match, or more is kept than there is.
     pub(crate) fn run<F>(
         &self,
         spectrum: &mut [Complex<T>],
@@ -121,11 +121,11 @@ impl<T: Real> Synthesis<T> {
         self.run_window(spectrum, [0, 0], keep, out, finish);
     }
 
-    /// [`Self::run`], keeping `keep` rows and columns from the row `start[0]` and the column `start[1]` on.
+    /// As [`Self::run`], but keeps `keep` rows and columns beginning with row `start[0]` and column `start[1]`.
     ///
     /// # Panics
     ///
-    /// If a length is another, or more is kept than there is.
+    /// If a length does not match, or more is kept than there is.
     pub(crate) fn run_window<F>(
         &self,
         spectrum: &mut [Complex<T>],
@@ -154,7 +154,7 @@ impl<T: Real> Synthesis<T> {
         spectrum.par_chunks_mut(self.rows).for_each_init(
             || vec![zero; self.along_y.get_inplace_scratch_len()],
             |scratch, line| {
-                // Waves of a narrow band leave many lines empty.
+                // Narrow-band waves leave many lines empty.
                 if line.iter().any(|&v| v != zero) {
                     self.along_y.process_with_scratch(line, scratch);
                 }
@@ -183,26 +183,26 @@ impl<T: Real> Synthesis<T> {
             );
     }
 
-    /// Length of the workspace that [`Self::run_real`] needs for so many rows.
+    /// Length of the buffer that [`Self::run_real`] needs for this many rows.
     #[must_use]
     pub(crate) fn half_len(&self, rows: usize) -> usize {
         2 * rows * self.columns.div_ceil(2)
     }
 
-    /// Sums two real fields at once, each from its half spectrum, and keeps some rows and the first `columns` of them.
+    /// Sums two real fields at once, each from its half spectrum, and keeps the given rows and the first `columns` columns.
     ///
-    /// A real field has S[−b, −a] = conj S[b, a], so `fill(b, first, second)` is asked for the lines b = 0, 1, …
-    /// below columns/2 only and must overwrite both with the `rows` values of the line. Line 0 must have this
-    /// symmetry in itself; the Nyquist line of an even number of columns is 0.
+    /// A real field has S[−b, −a] = conj S[b, a], so `fill(b, first, second)` is called only for the lines b = 0, 1, …
+    /// below columns/2 and must overwrite both with the `rows` values of the line. Line 0 must itself have this symmetry;
+    /// the Nyquist line of an even number of columns is 0.
     ///
     /// # Shapes
     ///
-    /// - `half`: a workspace of [`Self::half_len`] values of any content
+    /// - `half`: a buffer of [`Self::half_len`] values with any content
     /// - `first`, `second`: `[rows, columns]`, row after row
     ///
     /// # Panics
     ///
-    /// If a length is another, or more is kept than there is.
+    /// If a length does not match, or more is kept than there is.
     pub(crate) fn run_real<F>(
         &self,
         half: &mut [Complex<T>],
@@ -293,7 +293,7 @@ impl<T: Real> Synthesis<T> {
         }
     }
 
-    /// Transposes some rows into a block; reading a few rows at once touches each cache line once.
+    /// Transposes some rows into a block; reading several rows at once touches each cache line only once.
     fn gather(&self, spectrum: &[Complex<T>], rows: Range<usize>, block: &mut [Complex<T>]) {
         for (j, line) in spectrum.chunks_exact(self.rows).enumerate() {
             for (i, &v) in line[rows.clone()].iter().enumerate() {
@@ -311,7 +311,7 @@ impl<T: Real> Synthesis<T> {
     }
 }
 
-/// Sums waves around a circle, by one FFT.
+/// Sum of waves around a circle by one FFT.
 #[derive(Clone)]
 pub(crate) struct Circle(Arc<dyn Fft<f64>>);
 
@@ -330,13 +330,13 @@ impl Circle {
         self.0.len()
     }
 
-    /// Puts the values Σₘ cₘ e^{2πi mj/n} at the points j in the place of the coefficients cₘ.
+    /// Replaces the coefficients cₘ by the values Σₘ cₘ e^{2πi mj/n} at the points j.
     pub(crate) fn sum(&self, coefficients: &mut [Complex<f64>]) {
         self.0.process(coefficients);
     }
 }
 
-/// Takes real and imaginary parts apart.
+/// Separates real and imaginary parts.
 fn split<T: Real>(row: &[Complex<T>], re: &mut [f32], im: &mut [f32]) {
     for ((v, re), im) in row.iter().zip(re).zip(im) {
         *re = v.re.to_f32();
@@ -344,7 +344,7 @@ fn split<T: Real>(row: &[Complex<T>], re: &mut [f32], im: &mut [f32]) {
     }
 }
 
-/// Real and imaginary parts of a sum of the plane waves of a periodic lattice, in single precision.
+/// Real and imaginary parts of a sum of plane waves on a periodic lattice, in single precision.
 ///
 /// ```text
 /// f[i, j] = Σ_b Σ_a S[b, a] · exp(2πi (b·j/columns − a·i/rows))
@@ -354,11 +354,11 @@ fn split<T: Real>(row: &[Complex<T>], re: &mut [f32], im: &mut [f32]) {
 ///
 /// - `waves` S: `[columns, rows]` of the period; overwritten
 /// - `period`, `size`: rows and columns; `size` is at most the period
-/// - returns `[rows, columns]` of the size, row after row
+/// - returns arrays `[rows, columns]` of the given size, row after row
 ///
 /// # Panics
 ///
-/// If there are not rows × columns waves, or the size is larger than the period.
+/// If the number of waves is not rows × columns, or the size is larger than the period.
 #[must_use]
 pub fn lattice_sum(waves: &mut [Complex32], period: [usize; 2], size: [usize; 2]) -> [Vec<f32>; 2] {
     let [mut re, mut im] = [(); 2].map(|()| vec![0.0; size[0] * size[1]]);
@@ -367,7 +367,7 @@ pub fn lattice_sum(waves: &mut [Complex32], period: [usize; 2], size: [usize; 2]
     [re, im]
 }
 
-/// The smallest length of at least `n` whose only prime factors are 2, 3 and 5: the FFT is fast there.
+/// Smallest length of at least `n` whose only prime factors are 2, 3 and 5, for which the FFT is fast.
 #[must_use]
 pub fn fast_length(n: usize) -> usize {
     let mut m = n.max(1);
@@ -385,7 +385,7 @@ pub fn fast_length(n: usize) -> usize {
     }
 }
 
-/// Signed index of entry `index` of an FFT of length `n`: 0, 1, …, −2, −1; the middle of an even n is −n/2.
+/// Signed index of entry `index` of an FFT of length `n`: 0, 1, …, −2, −1; for even n the middle one is −n/2.
 #[must_use]
 pub(crate) fn signed_index(index: usize, n: usize) -> i64 {
     if index < n.div_ceil(2) {
@@ -399,7 +399,7 @@ pub(crate) fn signed_index(index: usize, n: usize) -> i64 {
 mod tests {
     use super::*;
 
-    /// Every lattice wave alone, on sizes even, odd, prime and 1, against its exponential.
+    /// Each lattice wave alone, on even, odd, prime and unit sizes, against its exponential.
     #[test]
     fn one_wave_is_its_exponential() {
         for (rows, columns) in [(1, 1), (4, 6), (5, 7), (16, 3), (20, 18)] {
@@ -439,7 +439,7 @@ mod tests {
                 let angle = 0.7 * (a * a) as f64 + 1.3 * b as f64 + shift;
                 Complex::new(angle.sin(), (2.0 * angle).cos())
             };
-            // Line 0 is made symmetric: the half with the smaller index is the partner's conjugate.
+            // Line 0 is made symmetric: the entry with the larger index is the conjugate of its partner.
             let value = |b: usize, a: usize, shift| match (b, (rows - a) % rows) {
                 (0, partner) if partner == a => Complex::new(wave(0, a, shift).re, 0.0),
                 (0, partner) if partner < a => wave(0, partner, shift).conj(),
@@ -458,7 +458,7 @@ mod tests {
             let n = rows * columns;
             let (mut re, mut im) = (vec![0.0; n], vec![0.0; n]);
             plan.run(&mut full, [rows, columns], [&mut re, &mut im], |_, _| ());
-            // Fewer rows, from the middle on, and columns kept, and a workspace that is not clean.
+            // Keeps only the last rows and the first columns, in a buffer with arbitrary content.
             let keep = [rows.div_ceil(2), columns.div_ceil(2)];
             let from = rows - keep[0];
             let mut half = vec![Complex::new(f64::NAN, 1.0); plan.half_len(keep[0])];

@@ -1,4 +1,4 @@
-//! Where the free waves are shown: all of them astern, none ahead, and a smooth passage along the hull.
+//! Fade of the free waves: all of them astern, none ahead, and a smooth transition along the hull.
 
 use crate::raster::{Field, Raster};
 use crate::track::Track;
@@ -9,9 +9,9 @@ use crate::track::Track;
 /// s = (L/2 − ξ)/L brought into [0, 1],     fade = s³ (10 − 15 s + 6 s²)
 /// ```
 ///
-/// 0 ahead of the bow, 1 astern of the stern, twice differentiable between. The free waves alone are right
-/// only astern; near the hull there is a local disturbance as well, which is left out. The passage is a
-/// choice: it hides the wrong waves ahead without a step.
+/// 0 ahead of the bow, 1 astern of the stern, twice differentiable between. The free waves alone are right only astern; near the
+/// hull there is a local disturbance as well, which is left out. The transition is a choice: it hides the wrong waves ahead
+/// without a step.
 ///
 /// - `forward` ξ \[m\]
 /// - `length` L \[m\], above 0
@@ -41,7 +41,7 @@ pub fn fade_field(track: &Track, length: f64, raster: &Raster) -> Field {
     field
 }
 
-/// [`fade`] at a place (x, y) \[m\]; all of it beside a ship that turns, whose waves begin where they are sent.
+/// [`fade`] at a place (x, y) \[m\]; 1 for a turning ship, whose waves begin where they are sent.
 pub(crate) fn fade_at(track: &Track, length: f64, place: [f64; 2]) -> f64 {
     match track.turn() {
         None => fade(track.seen_from_ship(place)[0], length),
@@ -49,7 +49,7 @@ pub(crate) fn fade_at(track: &Track, length: f64, place: [f64; 2]) -> f64 {
     }
 }
 
-/// [`fade_field`] over a field of the raster's size.
+/// Fills a field of the raster's size with [`fade_field`].
 pub(crate) fn fill_fade(field: &mut Field, track: &Track, length: f64, raster: &Raster) {
     if track.turn().is_some() {
         field.values.fill(1.0);
@@ -75,7 +75,7 @@ mod tests {
         assert_eq!(fade(0.0, 100.0), 0.5);
     }
 
-    /// Falling toward the bow, and with no step in the slope: its difference is at most of second order.
+    /// The fade falls toward the bow without a step in its slope: its second difference is at most of second order.
     #[test]
     fn passage_is_smooth() {
         let d = 0.01;

@@ -4,11 +4,12 @@
 //! ζ(ξ, η) = Re ∫ A(θ) e^{ik(ξ cos θ + η sin θ)} dθ = Re ∫ a(u) e^{i(αξ + βη)} du,     sec θ = cosh u
 //! ```
 //!
-//! with ξ forward of midship and η to port. The waves lie on one curve in the plane of wavenumbers, so the
-//! integral is a sum of plane waves as soon as its nodes are chosen ([`KelvinWake::plan`]); any field of
-//! them follows from [`synthesize`](crate::reference::synthesize). Files: `steady` the curve, `rays` where each wave is seen and how far the arms open, `zones` which part
-//! of it reaches a raster, `panels` the nodes, `turning` those of a ship that turns, `fade` where the waves are shown, `subpixel` what pixels do
-//! not carry, `quadrature` the slow integral that everything is checked against.
+//! with ξ forward of midship and η to port. The waves lie on one curve in the plane of wavenumbers, so the integral is a sum of
+//! plane waves once its nodes are chosen ([`KelvinWake::plan`]); any field of the waves follows from
+//! [`synthesize`](crate::reference::synthesize). Modules: `steady` has the curve, `rays` the ray of each wave and the opening of
+//! the arms, `zones` the part of the curve that reaches a raster, `panels` the nodes, `turning` the waves of a turning ship,
+//! `fade` the transition along the hull, `subpixel` the waves that pixels do not carry, and `quadrature` the slow integral used
+//! as a reference.
 
 pub(crate) mod quadrature;
 mod fade;
@@ -35,15 +36,15 @@ use crate::track::Track;
 use num_complex::Complex64;
 use steady::{SteadyWave, SteadyWaves};
 
-/// The direction θ \[rad\] of the waves on the arms, atan(1/√2): transverse waves below, divergent above.
+/// Direction θ \[rad\] of the waves on the arms, atan(1/√2): transverse waves below, divergent above.
 pub const CUSP_ANGLE: f64 = 0.615_479_708_670_387_3;
 
-/// A thin ship under way: everything its free waves depend on.
+/// A thin ship under way: everything on which its free waves depend.
 ///
 /// # Validity
 ///
-/// Linear, inviscid, steady speed and course for a long time past; gravity waves only. In water of finite
-/// depth the waves and their amplitudes are those of that depth.
+/// Linear and inviscid, with speed and course steady for a long time past; gravity waves only. In water of finite depth, the
+/// waves and their amplitudes are those of that depth.
 ///
 /// # References
 ///
@@ -54,18 +55,18 @@ pub struct KelvinWake {
     pub hull: Hull,
     /// Speed U [m/s], at least 0; a ship at rest makes no waves.
     pub speed: f64,
-    /// Place and direction at the time of the picture.
+    /// Place and direction at the time of the image.
     pub track: Track,
     /// Water depth h \[m\], above 0, may be infinite.
     pub depth: f64,
-    /// Weights the spectrum with e^{−kd}, d this depth \[m\], at least 0.
+    /// Depth d \[m\], at least 0; the spectrum is weighted with e^{−kd}.
     pub filter_depth: f64,
-    /// Largest slope of a wave one length of the ship astern of midship \[1\], above 0; no limit where absent. See
+    /// Largest slope of a wave one ship length astern of midship \[1\], above 0; `None` for no limit. See
     /// [`KelvinWake::unbroken`].
     pub steepness: Option<f64>,
 }
 
-/// Nodes over a period of the interference of bow and stern: exact for a cosine.
+/// Number of nodes over a period of the interference of bow and stern: exact for a cosine.
 const INTERFERENCE: usize = 8;
 
 impl KelvinWake {
@@ -87,7 +88,7 @@ impl KelvinWake {
     /// A(θ) = −(2/π) k sec θ · F̄/(1 − νh sec²θ/cosh²(kh)),    F with cosh(k(h − z))/cosh(kh)
     /// ```
     ///
-    /// - `direction` θ \[rad\] between the track and the way the wave runs, |θ| < π/2
+    /// - `direction` θ \[rad\] between the track and the direction of the wave, |θ| < π/2
     /// - returns A \[m\]; 0 where no wave keeps station with the ship
     #[must_use]
     pub fn amplitude(&self, direction: f64) -> Complex64 {
@@ -108,27 +109,27 @@ impl KelvinWake {
         self.source(wave.along, wave.wavenumber, wave.weight)
     }
 
-    /// −w F̄ e^{−kd} of the wavenumber k, α along the track [rad/m], w a weight.
+    /// −w F̄ e^{−kd} at the wavenumber k with the component α along the track [rad/m], w a weight.
     fn source(&self, along: f64, wavenumber: f64, weight: f64) -> Complex64 {
         let michell = self.hull.michell_integral(along, wavenumber, self.depth);
         let filter = (-wavenumber * self.filter_depth).exp();
         -michell.conj() * (weight * filter * self.unbroken(along, wavenumber))
     }
 
-    /// Share of the amplitude of a wave that has not broken.
+    /// Share of a wave's amplitude that has not broken.
     ///
     /// ```text
     /// (1 + s²/s_max²)^{−½},     s² = 8 k⁴ ⟨|F|²⟩/(π ν L cosh u),     k = ν cosh² u
     /// ```
     ///
-    /// s is the slope amplitude k `a_loc` that stationary phase gives the divergent waves of wavenumber k at the distance L of one
-    /// ship length, ⟨|F|²⟩ the square of Michell's integral averaged over the interference of bow and stern, `s_max` the limit
-    /// [`Self::steepness`]. A thin ship makes divergent waves steeper than water bears (slopes of 0.4 to 0.7 near the track); what is
-    /// steeper becomes turbulence near the hull. Long waves are not steep and stay. Next to the cusp, where stationary phase
-    /// fails, and for transverse waves s is that of a divergent wave of the same length.
+    /// s is the slope amplitude k `a_loc` that stationary phase gives the divergent waves of wavenumber k at the distance L of
+    /// one ship length, ⟨|F|²⟩ the square of Michell's integral averaged over the interference of bow and stern, and `s_max` the
+    /// limit [`Self::steepness`]. A thin ship makes divergent waves steeper than water can bear (slopes of 0.4 to 0.7 near the
+    /// track); the excess becomes turbulence near the hull. Long waves are not steep and remain. Next to the cusp, where
+    /// stationary phase fails, and for transverse waves, s is the slope of a divergent wave of the same length.
     ///
     /// - `along` α, `wavenumber` k [rad/m]
-    /// - 1 without a limit
+    /// - returns 1 without a limit
     ///
     /// # Validity
     ///

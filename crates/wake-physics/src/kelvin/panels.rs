@@ -1,4 +1,4 @@
-//! The nodes of the wake integral: as many as the tolerance, the raster and the band ask for.
+//! Nodes of the wake integral: as many as tolerance, raster and band require.
 
 use super::turning::{RingWork, Rings};
 use super::zones::{Piece, Reach};
@@ -8,14 +8,14 @@ use crate::raster::Raster;
 use crate::waves::PlaneWaves;
 use num_complex::Complex64;
 
-/// Nodes of a panel: large panels need the fewest nodes a period (2.4 here, 2 is the limit for none smaller).
+/// Nodes of a panel. Large panels need the fewest nodes per period (2.4 here; the lower limit is 2).
 const PANEL_NODES: usize = 32;
 
-/// Error of a panel as part of the tolerance: the sum of all amplitudes is some ten times a field's rms.
+/// Error of a panel as a share of the tolerance: the sum of all amplitudes is some ten times a field's rms.
 const PANEL_SHARE: f64 = 0.01;
 
-/// Waves of a turning ship that are left out, over the root mean square of all, in units of the tolerance: they hold less than
-/// the square of it of all energy. Chosen.
+/// Amplitude below which waves of a turning ship are left out, over the root mean square of all, in units of the tolerance
+/// (chosen): these waves hold less than its square of all energy.
 const RING_SHARE: f64 = 0.5;
 
 /// Computed range of wave directions.
@@ -23,29 +23,29 @@ const RING_SHARE: f64 = 0.5;
 pub struct Zone {
     /// Smallest and largest direction θ to the track \[rad\], to port positive.
     pub directions: [f64; 2],
-    /// Nodes in it.
+    /// Number of nodes in the range.
     pub nodes: usize,
 }
 
 /// Quadrature of the wake integral on a raster: its range of directions and its nodes.
 ///
-/// A plan without nodes stands for a wake that cannot be seen: no wave is long enough for the pixels, the
-/// ship is at rest, or the whole raster lies ahead of the bow.
+/// A plan without nodes stands for an invisible wake: no wave is long enough for the pixels, the ship is at rest, or the whole
+/// raster lies ahead of the bow.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct WakePlan {
     /// Ranges of directions, in order.
     pub zones: Vec<Zone>,
-    /// Nodes among the transverse waves, |θ| below [`CUSP_ANGLE`].
+    /// Number of nodes among the transverse waves, |θ| below [`CUSP_ANGLE`].
     pub transverse_nodes: usize,
-    /// Nodes among the divergent waves.
+    /// Number of nodes among the divergent waves.
     pub divergent_nodes: usize,
     /// Smallest and largest wavenumber [rad/m].
     pub wavenumbers: [f64; 2],
     /// Bound on the error of the quadrature at every pixel, relative to the sum of all |amplitude|.
     pub error_bound: f64,
-    /// Nodes u and weights, window included.
+    /// Nodes u and weights, including the window.
     quadrature: Vec<(f64, f64)>,
-    /// Rings of waves instead of nodes, behind a ship that turns.
+    /// Rings of waves instead of nodes, for a turning ship.
     rings: Option<Rings>,
     ring_work: RingWork,
 }
@@ -57,7 +57,7 @@ impl WakePlan {
         self.transverse_nodes + self.divergent_nodes
     }
 
-    /// What the rings take to compute, behind a ship that turns.
+    /// Work to compute the rings, for a turning ship.
     pub(crate) fn ring_work(&self) -> RingWork {
         self.ring_work
     }
@@ -67,15 +67,14 @@ impl WakePlan {
     }
 }
 
-/// The plan.
+/// Planning of the nodes.
 impl KelvinWake {
-    /// Chooses the nodes for a raster, so that the sum of plane waves is the integral to `tolerance`.
+    /// Chooses the nodes for a raster, so that the sum of plane waves equals the integral to within `tolerance`.
     ///
-    /// The band is |k| ≤ π/spacing, a sharp disk; waves that `filter_depth` weakens below the tolerance are
-    /// left out. Panels of 32 Gauss–Legendre nodes each span as much phase as the remainder of the rule
-    /// allows, at the pixel where phases turn fastest. A raster far from the ship gets only the directions
-    /// that reach it. The number of nodes grows with the pixels on a side of the raster, never with the
-    /// distance of the ship.
+    /// The band is |k| ≤ π/spacing, a sharp disk; waves that `filter_depth` weakens below the tolerance are left out. Each panel
+    /// of 32 Gauss–Legendre nodes spans as much phase as the remainder of the rule allows, at the pixel where phases change
+    /// fastest. A raster far from the ship gets only the directions that reach it. The number of nodes grows with the pixels on a
+    /// side of the raster, never with the distance of the ship.
     ///
     /// - `tolerance`: largest error relative to a field's rms, 1e-7 to 0.1
     ///
@@ -117,7 +116,7 @@ impl KelvinWake {
         plan
     }
 
-    /// The plane waves at the nodes of a plan, phases and time included.
+    /// Plane waves at the nodes of a plan, including phases and time.
     #[must_use]
     pub fn waves(&self, plan: &WakePlan) -> PlaneWaves {
         if let Some(rings) = &plan.rings {
@@ -136,7 +135,7 @@ impl KelvinWake {
         out
     }
 
-    /// The rings of waves of a ship that turns.
+    /// Rings of waves of a turning ship.
     fn plan_turn(&self, raster: &Raster, tolerance: f64) -> WakePlan {
         let Some(rings) = Rings::of(self, raster, RING_SHARE * tolerance) else {
             return WakePlan::default();
@@ -153,7 +152,7 @@ impl KelvinWake {
         }
     }
 
-    /// The plan with what its rings take, of which a few are computed.
+    /// The plan with the work for its rings, estimated from a few of them.
     pub(crate) fn with_ring_work(&self, plan: WakePlan) -> WakePlan {
         WakePlan {
             ring_work: plan
@@ -163,11 +162,11 @@ impl KelvinWake {
         }
     }
 
-    /// Largest |u|: by the band of the raster, or where the filter leaves nothing.
+    /// Largest |u|, limited by the band of the raster or by the filter.
     fn last(&self, raster: &Raster, tolerance: f64) -> Option<f64> {
         let steady = self.steady_waves();
         let first = steady.at(steady.first()).wavenumber;
-        // The slopes of short waves are larger by k: a thousandth of the tolerance covers the band.
+        // The slopes of short waves are larger by a factor of k: a thousandth of the tolerance covers the band.
         let filtered = first + (1e3 / tolerance).ln() / self.filter_depth;
         steady.last(raster.nyquist_wavenumber().min(filtered))
     }
@@ -182,8 +181,8 @@ impl KelvinWake {
         }
     }
 
-    /// How often panels are halved toward the beginning of the curve, which has a fine structure of the
-    /// width √|νh − 1| near the critical speed.
+    /// Number of times that panels are halved toward the beginning of the curve, which has a fine structure of the width √|νh −
+    /// 1| near the critical speed.
     pub(super) fn grading(&self) -> i32 {
         let width = self.steady_waves().subcriticality().abs().sqrt();
         (0.5 / width.max(1e-6)).log2().ceil().max(0.0) as i32
@@ -210,7 +209,7 @@ impl WakePlan {
 struct Builder<'a> {
     reach: &'a Reach,
     rule: GaussLegendre,
-    /// Phase a panel may span \[rad\].
+    /// Phase that a panel may span \[rad\].
     phase: f64,
     sharpness: f64,
     plan: WakePlan,
@@ -255,7 +254,7 @@ impl<'a> Builder<'a> {
             let begins =
                 first > 0.0 && (start > 0.0 && start <= first || end < 0.0 && end >= -first);
             for (t, w) in self.rule.on(0.0, 1.0) {
-                // Where the curve begins off the axis its points go as the square root of u: u ∝ t².
+                // Where the curve begins off the axis, its points vary as the square root of u: u ∝ t².
                 let (s, ds) = match (begins, start > 0.0) {
                     (false, _) => (t, 1.0),
                     (true, true) => (t * t, 2.0 * t),
@@ -274,7 +273,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Where a panel from `start` ends, so that no phase turns by more than allowed in it.
+    /// End of a panel from `start` in which no phase turns by more than allowed.
     fn panel_end(&self, start: f64, to: f64) -> f64 {
         let mut width = (to - start).min(1.0);
         for _ in 0..12 {

@@ -1,4 +1,4 @@
-//! The wake integral by brute force: the oracle of the nodes a plan chooses.
+//! The wake integral by brute force: the reference for the nodes of a plan.
 
 use super::KelvinWake;
 use crate::raster::Raster;
@@ -6,7 +6,7 @@ use crate::waves::{Quantity, Transfer};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-/// Intervals of the coarsest rule, and how often they may be halved.
+/// Intervals of the coarsest rule, and largest number of halvings.
 const COARSEST: usize = 256;
 const HALVINGS: usize = 14;
 
@@ -16,8 +16,8 @@ const HALVINGS: usize = 14;
 /// field(x, y) = Re ∫ T A(θ) e^{i k·(x − x_ship)} dθ,     |k| ≤ π/spacing
 /// ```
 ///
-/// Intervals are halved until the sum changes by less than `error` of the integral of the magnitude (or for
-/// the 14th time). Independent of the nodes of a plan: other variable, other rule. No fade over the hull.
+/// Intervals are halved until the sum changes by less than `error` of the integral of the magnitude, at most 14 times. The result
+/// is independent of the nodes of a plan: another variable and another rule. There is no fade over the hull.
 ///
 /// # Shapes
 ///
@@ -49,8 +49,7 @@ pub fn direct_quadrature(
         .collect()
 }
 
-/// Integrand over v in [0, 1] with θ = θ₀ + (θ₁ − θ₀)v², waves to port and to starboard together: values,
-/// then magnitudes.
+/// Integrand over v in [0, 1] with θ = θ₀ + (θ₁ − θ₀)v², waves to port and to starboard added: values, then magnitudes.
 fn integrand(
     wake: &KelvinWake,
     transfer: &Transfer,
@@ -75,8 +74,8 @@ fn integrand(
     out
 }
 
-/// Romberg's rule on [0, 1] for `count` values, whose magnitudes follow them: trapezoids of halved intervals,
-/// extrapolated to none.
+/// Romberg's rule on [0, 1] for `count` values followed by their magnitudes: trapezoidal sums over halved intervals, extrapolated
+/// to intervals of width 0.
 fn romberg(f: impl Fn(f64) -> Vec<f64>, count: usize, error: f64) -> Vec<f64> {
     let sum = |start: f64, step: f64, n: usize| {
         let mut total = vec![0.0; 2 * count];

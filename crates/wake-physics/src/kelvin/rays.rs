@@ -1,22 +1,22 @@
-//! Where the waves of a wake are seen: each on its ray from the ship, all of them between the arms.
+//! Directions in which the waves of a wake are seen: each on its ray from the ship, all of them between the arms.
 
 use super::KelvinWake;
 use super::steady::SteadyWaves;
 use crate::numeric::largest;
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// Kelvin's angle arcsin(1/3) \[rad\]: the arms of a wake in deep water leave the track at it.
+/// Kelvin's angle arcsin(1/3) \[rad\] between the track and the arms of a wake in deep water.
 pub const KELVIN_ANGLE: f64 = 0.339_836_909_454_121_9;
 
-/// From this νh on the depth changes the angle by less than rounding: tanh(νh) is 1.
+/// νh above which the depth changes the angle by less than rounding: tanh(νh) is 1.
 const DEEP: f64 = 20.0;
 
-/// The steady wave that bounds a subcritical wake is looked for between these ln u; the upper one is the cusp wave of
-/// deep water, tan θ = sinh u = 1/√2, and shallower water moves it down.
+/// Range of ln u in which the steady wave that bounds a subcritical wake is searched. The upper end is the cusp wave of deep
+/// water, tan θ = sinh u = 1/√2, and shallower water moves it down.
 const SEARCH: [f64; 2] = [-25.0, -0.417];
 
-/// Steps of the search; each leaves 0.618 of the interval: 25·0.618⁶⁰ is 7e-12 of ln u, and the largest angle
-/// depends on that by its square.
+/// Steps of the search. Each leaves 0.618 of the interval: 25·0.618⁶⁰ is 7e-12 of ln u, and the error of the largest angle is
+/// quadratic in that.
 const STEPS: usize = 60;
 
 /// Waves of one side of a wake: a step along the curve of steady waves, seen on one ray.
@@ -24,7 +24,7 @@ const STEPS: usize = 60;
 pub(crate) struct Ray {
     /// Wavenumber (along the track, away from it) [rad/m].
     pub(crate) k: [f64; 2],
-    /// Angular frequency seen from the sea [rad/s].
+    /// Angular frequency in the frame of the sea [rad/s].
     pub(crate) omega: f64,
     /// tan ψ: distance off the track over the distance astern of midship \[1\].
     pub(crate) tangent: f64,
@@ -32,20 +32,20 @@ pub(crate) struct Ray {
     pub(crate) energy: f64,
 }
 
-/// Steps along the curve; the interference of bow and stern turns less than a radian in each.
+/// Steps along the curve; the interference of bow and stern turns by less than a radian in each.
 const RAYS: usize = 512;
 
 impl KelvinWake {
-    /// The waves no longer than a pixel carries (k up to `largest` [rad/m]) on their rays, those of one side.
+    /// Waves of one side that a pixel carries (k up to `largest` [rad/m]), on their rays.
     ///
-    /// At any distance astern, whichever it is, a place off the track has by stationary phase the mean square
-    /// ½·2π|a|²/|φ''|; over the places of a step du of the curve that is
+    /// By stationary phase, the mean square off the track is ½·2π|a|²/|φ''| at any distance astern. Over the places of a step du
+    /// of the curve that is
     ///
     /// ```text
     /// ∫ ⟨ζ²⟩ dη = π |a(u)|² du/|dβ/du|
     /// ```
     ///
-    /// without the infinity that stationary phase has on the arms themselves.
+    /// without the infinity of stationary phase on the arms themselves.
     pub(crate) fn rays(&self, largest: f64) -> Vec<Ray> {
         let waves = self.steady_waves();
         let last = (self.speed > 0.0).then(|| waves.last(largest)).flatten();
@@ -72,8 +72,8 @@ impl KelvinWake {
 
 /// Angle between the track and each arm of the wake.
 ///
-/// A steady wave of parameter u (sec θ = cosh u) reaches the places where its phase αξ + βη is stationary along the
-/// curve of steady waves, a ray at
+/// A steady wave of parameter u (sec θ = cosh u) reaches the places where its phase αξ + βη is stationary along the curve of
+/// steady waves: a ray at
 ///
 /// ```text
 /// tan ψ(u) = (dα/du)/(dβ/du)
@@ -82,7 +82,7 @@ impl KelvinWake {
 /// ```
 ///
 /// - `speed` U [m/s], at least 0; `depth` h \[m\], above 0, may be infinite
-/// - returns the angle \[rad\], from arcsin(1/3) to π/2; that of deep water for a ship at rest, which has no wake
+/// - returns the angle \[rad\], from arcsin(1/3) to π/2; for a ship at rest, which has no wake, the angle of deep water
 ///
 /// # References
 ///
@@ -122,7 +122,7 @@ mod tests {
         assert!((SEARCH[1] - FRAC_1_SQRT_2.asinh().ln()).abs() < 1e-3 && SEARCH[1] > -0.4180);
         assert_eq!(half_angle(10.0, f64::INFINITY), KELVIN_ANGLE);
         assert_eq!(half_angle(0.0, 5.0), KELVIN_ANGLE);
-        // The search itself finds it where depth begins to count no more.
+        // The search itself finds the angle where depth just ceases to matter.
         let searched = half_angle(10.0, 0.99 * DEEP * 100.0 / GRAVITY);
         assert!((searched - KELVIN_ANGLE).abs() < 1e-12, "{searched}");
     }
@@ -137,8 +137,8 @@ mod tests {
         assert!((half_angle(10.0, depth_of(10.0, 1.0)) - FRAC_PI_2).abs() < 1e-7);
     }
 
-    /// Near the critical speed, u and ε = νh − 1 small, the ray is tan ψ = u/(ε + 2u²) to leading order: its largest
-    /// value is 1/√(8ε). The next order is ε relative to it.
+    /// Near the critical speed, with u and ε = νh − 1 small, the ray is tan ψ = u/(ε + 2u²) to leading order, with the largest
+    /// value 1/√(8ε). The next order is ε relative to it.
     #[test]
     fn just_below_the_critical_speed_it_follows_its_expansion() {
         for excess in [1e-3, 1e-5, 1e-7] {
@@ -152,9 +152,9 @@ mod tests {
         }
     }
 
-    /// Group velocity, an independent way: a wave of phase speed U cos θ runs at θ with the group speed
-    /// q U cos θ, q = ½(1 + 2kh/sinh 2kh), so it lies at tan ψ = q sin θ cos θ/(1 − q cos² θ). Searched on
-    /// a lattice of kh, of which θ follows from cos²θ = tanh(kh)/(kh F²).
+    /// An independent derivation by group velocity: a wave of phase speed U cos θ runs at θ with the group speed q U cos θ, q =
+    /// ½(1 + 2kh/sinh 2kh), so it lies at tan ψ = q sin θ cos θ/(1 − q cos² θ). Searched on a lattice of kh, from which θ follows
+    /// by cos²θ = tanh(kh)/(kh F²).
     #[test]
     fn group_velocity_gives_the_same_angle() {
         for froude in [0.3, 0.5, 0.7, 0.9, 0.97, 0.999] {

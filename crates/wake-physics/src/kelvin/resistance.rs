@@ -1,11 +1,11 @@
-//! Wave resistance, which tests compare with published curves: the work a ship does to keep its waves going.
+//! Wave resistance, the work that a ship does to sustain its waves, for comparison with published curves.
 
 use super::KelvinWake;
 use super::panels::unwindowed;
 use super::zones::Reach;
 use crate::constants::{GRAVITY, SEA_WATER_DENSITY};
 
-/// λ beyond which the integrand, falling as λ⁻⁴, holds less than 1e-10 of the resistance.
+/// λ beyond which the integrand, falling as λ⁻⁴, contributes less than 1e-10 of the resistance.
 const LAST_LAMBDA: f64 = 300.0;
 
 /// Error of the quadrature relative to the integral of the magnitude.
@@ -31,7 +31,7 @@ impl KelvinWake {
         }
         let steady = self.steady_waves();
         let first = steady.first();
-        // |F|² carries the phase between bow and stern, twice that of F to midship, and the decay twice.
+        // |F|² has the phase between bow and stern, twice the phase of F to midship, and twice the decay.
         let reach = Reach::new(
             steady,
             vec![[0.0, 0.0]],

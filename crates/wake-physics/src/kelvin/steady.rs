@@ -1,8 +1,8 @@
-//! The waves that keep station with a ship: one curve in the plane of wavenumbers.
+//! Waves that keep station with a ship: one curve in the plane of wavenumbers.
 
 use std::f64::consts::PI;
 
-/// Waves whose phase stands still seen from a ship of constant speed.
+/// Waves whose phase is stationary as seen from a ship of constant speed.
 ///
 /// A wave that runs at the angle θ to the track with λ = sec θ = cosh u satisfies
 ///
@@ -10,8 +10,8 @@ use std::f64::consts::PI;
 /// k = ν λ² tanh(kh),   ν = g/U²,     along the track α = k/λ,   across β = k tanh u
 /// ```
 ///
-/// In deep water k = ν cosh² u for every u. In water of finite depth the curve begins where νhλ² = 1:
-/// at u = 0 below the critical speed √(gh), and beyond it above.
+/// In deep water k = ν cosh² u for every u. In water of finite depth the curve begins at u = 0 below the critical speed √(gh),
+/// and where νhλ² = 1 above it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SteadyWaves {
     /// ν = g/U² [1/m].
@@ -43,7 +43,7 @@ impl SteadyWaves {
         }
     }
 
-    /// νh − 1: above 0 below the critical speed; infinite in deep water.
+    /// νh − 1: positive below the critical speed, infinite in deep water.
     pub(crate) fn subcriticality(&self) -> f64 {
         self.nu * self.depth - 1.0
     }
@@ -53,7 +53,7 @@ impl SteadyWaves {
         (self.nu * self.depth).sqrt().recip().max(1.0).acosh()
     }
 
-    /// The |u| beyond which waves are shorter than 2π/`wavenumber`, if any are longer.
+    /// |u| beyond which waves are shorter than 2π/`wavenumber`; `None` if no wave is longer.
     pub(crate) fn last(&self, wavenumber: f64) -> Option<f64> {
         let tanh = (wavenumber * self.depth).tanh();
         let lambda = (wavenumber / (self.nu * tanh)).sqrt();
@@ -83,13 +83,13 @@ impl SteadyWaves {
         }
     }
 
-    /// k, and 1 − νhλ²/cosh²(kh), the factor by which the curve's slope differs from deep water.
+    /// k, and the factor 1 − νhλ²/cosh²(kh) by which the slope of the curve differs from deep water.
     fn wavenumber(&self, u: f64) -> (f64, f64) {
         let deep = self.nu * u.cosh().powi(2);
         if (deep * self.depth) > 20.0 {
             return (deep, 1.0); // tanh 20 is 1 in double precision
         }
-        // X = A tanh X with X = kh; A − 1 without cancellation.
+        // X = A tanh X with X = kh; A − 1 is computed without cancellation.
         let excess = self.subcriticality() + self.nu * self.depth * u.sinh().powi(2);
         let a = 1.0 + excess;
         let x = dispersion_root(a, excess.max(0.0));
@@ -106,8 +106,8 @@ impl SteadyWaves {
 
 /// The positive root of X = A tanh X, for A − 1 = `excess` ≥ 0.
 ///
-/// Newton's method from above: tanh X ≤ X/√(1 + 2X²/3) and tanh X ≤ 1 bound the root, and the function is
-/// convex, so that it falls monotonically.
+/// Newton's method from above: tanh X ≤ X/√(1 + 2X²/3) and tanh X ≤ 1 bound the root, and the function is convex, so the iterates
+/// fall monotonically.
 fn dispersion_root(a: f64, excess: f64) -> f64 {
     let mut x = (1.5 * excess * (a + 1.0)).sqrt().min(a);
     for _ in 0..40 {
@@ -176,8 +176,8 @@ mod tests {
         assert_eq!(SteadyWaves::new(10.0, f64::INFINITY).last(0.09), None);
     }
 
-    /// At the critical speed the curve begins with waves without end: X = √3 u, and the weight 3/(π h X) stays finite where
-    /// 1 − y/sinh y is below the rounding.
+    /// At the critical speed the curve begins with infinitely long waves: X = √3 u, and the weight 3/(π h X) stays finite where 1
+    /// − y/sinh y is below rounding.
     #[test]
     fn weights_near_the_critical_speed_are_their_series() {
         let waves = SteadyWaves {
@@ -187,7 +187,7 @@ mod tests {
         for u in [1e-4, 1e-7, 1e-9] {
             let x = 3f64.sqrt() * u;
             let wave = waves.at(u);
-            // Terms of the order u², and the rounding of X − tanh X over X³.
+            // Terms of order u², and the rounding of X − tanh X over X³.
             let allowed = u * u + 1e-15 / (u * u);
             assert!(
                 (wave.wavenumber / x - 1.0).abs() < allowed.min(1e-6),

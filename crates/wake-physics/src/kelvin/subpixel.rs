@@ -1,7 +1,7 @@
-//! Waves of a ship that pixels do not carry: the variances of their slopes and velocities, by place.
+//! Waves of a ship that pixels do not carry: variances of their slopes and velocities, by place.
 //!
-//! By stationary phase the wave of parameter u lies on the ray tan ψ = α'/β', and at the distance d astern of midship it
-//! has the mean square
+//! By stationary phase, the wave of parameter u lies on the ray tan ψ = α'/β', and at the distance d astern of midship its mean
+//! square is
 //!
 //! ```text
 //! ⟨ζ²⟩ = ½ a_loc² = π|a(u)|²/(β' |dT/du| d),   T = tan ψ(u)         s² = k² ⟨ζ²⟩ e^{−4ν_w k² t},   s² ≤ s²_max
@@ -14,17 +14,17 @@ use super::{INTERFERENCE, KelvinWake, fade};
 use crate::track::Track;
 use std::f64::consts::{PI, TAU};
 
-/// Largest slope variance of one wave, that of an amplitude of 0.2 over its wavenumber: steeper ones break (chosen). What
-/// is below stays as it is, so that waves count the same on pixels that carry them.
+/// Largest slope variance of one wave (chosen): that of an amplitude of 0.2 over its wavenumber, as steeper waves break. Smaller
+/// variances are not changed, so that waves count the same on pixels that carry them.
 pub(crate) const LARGEST_SLOPE_VARIANCE: f64 = 0.02;
 
 /// Kinematic viscosity `ν_w` of sea water at 20 °C [m²/s].
 const VISCOSITY: f64 = 1.05e-6;
 
-/// Steps along the curve of steady waves.
+/// Number of steps along the curve of steady waves.
 const STEPS: usize = 1024;
 
-/// Rays from the track to the outermost one.
+/// Number of rays from the track to the outermost ray.
 const RAYS: usize = 512;
 
 /// Waves of one ship between two wavenumbers.
@@ -32,10 +32,10 @@ const RAYS: usize = 512;
 pub(crate) struct SubpixelWake {
     track: Track,
     length: f64,
-    /// Angle between two rays \[rad\], and tangent of that of the outermost one.
+    /// Angle between two rays \[rad\], and tangent of the angle of the outermost ray.
     step: f64,
     widest: f64,
-    /// Transverse and divergent waves by ray: of one ray there is one of each.
+    /// Transverse and divergent waves by ray: each ray has one of each.
     branches: [Vec<WavesOfRay>; 2],
 }
 
@@ -55,14 +55,14 @@ struct WavesOfRay {
 /// Variances at one place.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Roughness {
-    /// Of the slopes: xx, xy and yy \[1\].
+    /// Variances of the slopes: xx, xy and yy \[1\].
     pub(crate) slopes: [f64; 3],
-    /// Of the velocity of the water along x and upward, which are a quarter of a period apart [m²/s²].
+    /// Variances of the velocity of the water along x and upward, which are a quarter of a period apart [m²/s²].
     pub(crate) velocity: [f64; 2],
 }
 
 impl Roughness {
-    /// Of two ships' waves.
+    /// Variances of two ships' waves together.
     pub(crate) fn plus(&self, other: &Self) -> Self {
         Self {
             slopes: [0, 1, 2].map(|n| self.slopes[n] + other.slopes[n]),
@@ -70,7 +70,7 @@ impl Roughness {
         }
     }
 
-    /// Of the velocity toward the radar at the incidence θ \[rad\] [m²/s²].
+    /// Variance of the velocity toward the radar at the incidence θ \[rad\] [m²/s²].
     pub(crate) fn radial(&self, incidence: f64) -> f64 {
         let (sin, cos) = incidence.sin_cos();
         self.velocity[0] * sin * sin + self.velocity[1] * cos * cos
@@ -78,7 +78,7 @@ impl Roughness {
 }
 
 impl KelvinWake {
-    /// The waves of a band of wavenumbers (`from`, `to`) [rad/m]; `None` where there are none.
+    /// Waves of a band of wavenumbers (`from`, `to`) [rad/m]; `None` where there are none.
     pub(crate) fn subpixel(&self, [from, to]: [f64; 2]) -> Option<SubpixelWake> {
         if self.speed <= 0.0 || from >= to {
             return None;
@@ -109,7 +109,7 @@ impl KelvinWake {
             let sum = Sum {
                 slopes: k * k * energy,
                 cosine,
-                // The waves' energy follows at half their speed, c = U cos θ.
+                // The waves' energy travels at half their speed, c = U cos θ.
                 decay: 4.0 * VISCOSITY * k * k / (self.speed * (1.0 - 0.5 * cosine * cosine)),
             };
             let branch = &mut sums[usize::from(n >= outermost)];
@@ -141,7 +141,7 @@ impl KelvinWake {
     }
 }
 
-/// Waves gathered on a ray, weighted with their slopes.
+/// Waves collected on a ray, weighted with their slopes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Sum {
     slopes: f64,
@@ -150,7 +150,7 @@ struct Sum {
 }
 
 impl Sum {
-    /// Spreads the waves of a step between two rays, of angles [rad], evenly over the rays between.
+    /// Spreads the waves of a step between two angles [rad] evenly over the rays between them.
     fn spread(&self, edges: [f64; 2], step: f64, rays: &mut [Self]) {
         let [low, high] = [edges[0].min(edges[1]) / step, edges[0].max(edges[1]) / step];
         let last = (high as usize).min(rays.len() - 1);
@@ -170,7 +170,7 @@ impl Sum {
         }
     }
 
-    /// The mean over ray number `n`, per distance off the track.
+    /// Mean over ray number `n`, per distance off the track.
     fn on_ray(&self, n: usize, step: f64, speed: f64) -> WavesOfRay {
         if self.slopes <= 0.0 {
             return WavesOfRay::default();
@@ -187,10 +187,10 @@ impl Sum {
 }
 
 impl SubpixelWake {
-    /// The variances at a place (x, y) \[m\], which fade over the hull as the waves do; `None` outside the rays.
+    /// Variances at a place (x, y) \[m\], faded over the hull like the waves; `None` outside the rays.
     pub(crate) fn at(&self, place: [f64; 2]) -> Option<Roughness> {
         let [ahead, port] = self.track.seen_from_ship(place);
-        // Behind a ship that turns the waves are those of a straight track along the tangent there.
+        // Behind a turning ship, the waves are those of a straight track along the tangent there.
         let there = match self.track.turn() {
             None => self.track,
             Some(_) => self.track.at(ahead),
@@ -273,7 +273,7 @@ mod tests {
         }
     }
 
-    /// The steady wave of a length \[m\], and the waves around it on their ray.
+    /// The steady wave of a given length \[m\], and the waves around it on their ray.
     fn of_length(length: f64) -> (SteadyWave, WavesOfRay) {
         let (wake, k) = (wake(), TAU / length);
         let steady = wake.steady_waves();
@@ -287,8 +287,8 @@ mod tests {
         (wave.rates[1] / wave.rates[2]).atan()
     }
 
-    /// Angle of the ray, amplitude over √2 of the envelope and steepness 500 m astern, computed for another programme with
-    /// the closed form of φ'' and rounded to two or three digits.
+    /// Angle of the ray, amplitude (envelope over √2) and steepness 500 m astern agree with another programme, which uses the
+    /// closed form of φ'' and rounds to two or three digits.
     #[test]
     fn rays_and_amplitudes_are_those_of_another_programme() {
         let table = [
@@ -307,16 +307,16 @@ mod tests {
                 "{length}"
             );
             let steep = (2.0 * waves.slopes / 500.0).sqrt();
-            // Half a unit of the last digit, 1.3 %, and what its envelope leaves out: (2/kT)² and 1/(αL) to the second
-            // order, 1 % for the longer waves.
+            // Half a unit of the last digit, 1.3 %, and the terms that its envelope omits: (2/kT)² and 1/(αL) to second order, 1
+            // % for the longer waves.
             assert!((steep / steepness - 1.0).abs() < 0.025, "{length}: {steep}");
             let a = steep / wave.wavenumber;
             assert!((a / amplitude - 1.0).abs() < 0.025, "{length}: {a}");
         }
     }
 
-    /// Rays and ages by the group velocity, an independent way: `tan α = c_g sin χ/(U − c_g cos χ)`,
-    /// `t = d/(U − c_g cos χ)`.
+    /// Rays and ages by the group velocity, an independent derivation: `tan α = c_g sin χ/(U − c_g cos χ)`, `t = d/(U − c_g cos
+    /// χ)`.
     #[test]
     fn waves_lie_and_age_as_their_groups_run() {
         for length in [20.0, 5.0, 1.0, 0.1] {
@@ -336,8 +336,8 @@ mod tests {
         }
     }
 
-    /// The simulator's own sum of waves, 4 km astern: the mean square of its slopes over a sector in which the phase
-    /// between bow and stern waves turns three times.
+    /// Variances agree with the simulator's own sum of waves, 4 km astern: the mean square of its slopes over a sector in which
+    /// the phase between bow and stern waves turns three times.
     #[test]
     fn variances_are_those_of_the_sum_of_waves() {
         let wake = wake();
@@ -397,7 +397,7 @@ mod tests {
         }
         let found = [(0, 0), (0, 1), (1, 1), (2, 2), (3, 3)].map(|(a, b)| product(a, b));
         for (n, (found, expected)) in found.into_iter().zip(sum).enumerate() {
-            // Some 15 × 20 waves, whole to one at the edges of each side, and the curvature of the envelope.
+            // Some 15 × 20 waves, complete to within one at the edges, and the curvature of the envelope.
             assert!(
                 (found / expected - 1.0).abs() < 0.05,
                 "{n}: {found} {expected}"
@@ -412,7 +412,7 @@ mod tests {
         let variance = near.slopes[0] + near.slopes[2];
         assert!((variance - LARGEST_SLOPE_VARIANCE).abs() < 1e-12);
         assert_eq!(waves.steepest(10.0), LARGEST_SLOPE_VARIANCE);
-        // Waves of 10.5 m lie at 11.4°; nothing outside, nor ahead of the bow.
+        // Waves of 10.5 m lie at 11.4°; there are none outside, nor ahead of the bow.
         assert!(waves.at([-190.0, -1000.0]).is_some() && waves.at([-210.0, -1000.0]).is_none());
         assert!(waves.at([-1.0, 98.0]).is_none());
         let over = waves.at([1.0, -20.0]).unwrap();
@@ -422,7 +422,7 @@ mod tests {
         let [port, starboard] = [-60.0, 60.0].map(|x| waves.at([x, -700.0]).unwrap());
         assert_eq!(port.slopes[0], starboard.slopes[0]);
         assert_eq!(port.slopes[1], -starboard.slopes[1]);
-        // Far astern viscosity leaves nothing of the shortest.
+        // Far astern, viscosity has removed the shortest waves.
         let [mid, far] = [2e3, 6e3].map(|d| waves.at([-0.025 * d, -d]).unwrap().slopes[0]);
         assert!(mid > 0.0 && far < 0.1 * mid);
         assert!(wake().subpixel([60.0, 50.0]).is_none());

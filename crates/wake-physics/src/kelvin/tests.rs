@@ -43,8 +43,8 @@ fn elevations(wake: &KelvinWake, raster: &Raster, places: &[[f64; 2]], tolerance
         .collect()
 }
 
-/// The value quoted by Doctors and Beck (1987), Table 1, within the 1e-3 by which Michell's integral itself
-/// differs from it, and all entries by our own second implementation, `tests/reference/ship.py`, to their last digit.
+/// One value is that of Doctors and Beck (1987), Table 1, to within the 1e-3 by which Michell's integral itself differs from it;
+/// all values are those of a second implementation, `tests/reference/ship.py`, to their last digit.
 #[test]
 fn wave_resistance_of_the_standard_hull() {
     let hull = Hull::wigley(1.0, 0.1, 0.0625);
@@ -62,7 +62,7 @@ fn wave_resistance_of_the_standard_hull() {
     for (froude, expected) in table {
         let speed = froude * GRAVITY.sqrt();
         let coefficient = 1e3 * wake(hull, speed, 0.0).wave_resistance_coefficient();
-        // Half a unit of the last digit given, and the 1e-4 to which the table states itself.
+        // Half a unit of the last digit, and the accuracy of 1e-4 that the table states.
         assert!(
             (coefficient - expected).abs() < 5e-5 + 1e-4 * expected,
             "{froude} {coefficient}"
@@ -73,7 +73,7 @@ fn wave_resistance_of_the_standard_hull() {
     }
 }
 
-/// Newtons for the scene's ship, by `tests/reference/ship.py`: four digits (truncated at λ = 60).
+/// Resistance of the scene's ship in newtons, by `tests/reference/ship.py`: four digits (truncated at λ = 60).
 #[test]
 fn wave_resistance_of_the_scene_ship() {
     for (speed, expected) in [
@@ -122,7 +122,7 @@ fn resistance_scales_with_volume() {
     assert!((large / small / 1e6 - 1.0).abs() < 1e-9);
 }
 
-/// The reference points: large ship and small hull, evaluated at a depth d so that no cut-off matters.
+/// Reference points of a large ship and a small hull, with a filter depth d so that no cut-off matters.
 #[test]
 fn elevations_at_the_reference_points() {
     let large = [
@@ -166,7 +166,7 @@ fn elevations_at_the_reference_points() {
     };
     let places: Vec<[f64; 2]> = small.iter().map(|p| p.0).collect();
     for (value, row) in elevations(&ship, &raster, &places, 1e-6).iter().zip(small) {
-        // The page states that two quadratures agree to 1.1e-6 m at the last point.
+        // The reference states that two quadratures agree to 1.1e-6 m at the last point.
         assert!((value - row.1).abs() < 1.2e-6, "{row:?} {value}");
     }
 }
@@ -223,7 +223,7 @@ fn assert_plan_is_right(wake: &KelvinWake, raster: &Raster, tolerances: &[f64]) 
                 .zip(exact)
                 .map(|(f, e)| (f - e).abs())
                 .fold(0.0, f64::max);
-            // Not their ratio: waves shorter than those that modulate leave a modulation of 0.
+            // Not as a ratio: where all waves are too short to modulate, the modulation is 0.
             let rms = rms(exact);
             assert!(
                 worst <= tolerance * rms,
@@ -233,8 +233,8 @@ fn assert_plan_is_right(wake: &KelvinWake, raster: &Raster, tolerances: &[f64]) 
     }
 }
 
-/// The plan's promise, for ships in and off the raster, slow and fast (Froude 0.05 to 1.5), in deep and in
-/// shallow water (below, near and above the critical speed).
+/// The plan meets its tolerance for ships in and off the raster, slow and fast (Froude 0.05 to 1.5), in deep and in shallow water
+/// (below, near and above the critical speed).
 #[test]
 fn plan_is_the_integral() {
     let at = |x, y, ship: KelvinWake| KelvinWake {
@@ -282,7 +282,7 @@ fn plan_is_the_integral() {
     }
 }
 
-/// A ship far away gets a bounded number of waves, and they are right.
+/// A ship far away gets a bounded number of waves, and they are correct.
 #[test]
 fn distant_ship_is_bounded_and_right() {
     let raster = Raster::image(40, 40, 12.0);
@@ -311,7 +311,7 @@ fn distant_ship_is_bounded_and_right() {
     }
 }
 
-/// No wave where none can be: ahead of the bow, at rest, and where all are shorter than pixels carry.
+/// There are no waves where none can be seen: ahead of the bow, at rest, and where all are shorter than pixels carry.
 #[test]
 fn plan_is_empty_where_nothing_can_be_seen() {
     let raster = Raster::image(64, 64, 2.5);
@@ -326,8 +326,8 @@ fn plan_is_empty_where_nothing_can_be_seen() {
     }
 }
 
-/// The contract of the whole fast path at the default scene: fields against the sum of the same waves, and
-/// the rounding of the result to f32 taken off.
+/// Tolerance of the whole fast path at the default scene: fields agree with the sum of the same waves, apart from the rounding of
+/// the result to f32.
 #[test]
 fn fields_meet_their_tolerance() {
     let raster = Raster::image(512, 512, 2.5);
@@ -357,8 +357,8 @@ fn fields_meet_their_tolerance() {
     }
 }
 
-/// ∫ cos(X cosh u) du = −π Y₀(X) and ∫ sin(X cosh u) du = π J₀(X): waves of unit strength on the track, cut
-/// off smoothly where the exact integral has no more to add.
+/// ∫ cos(X cosh u) du = −π Y₀(X) and ∫ sin(X cosh u) du = π J₀(X): waves of unit strength on the track, cut off smoothly where
+/// the exact integral adds nothing more.
 #[test]
 fn waves_on_the_track_are_bessel_functions() {
     let steady = SteadyWaves::new(GRAVITY.sqrt(), f64::INFINITY); // ν = 1 m⁻¹
@@ -460,7 +460,7 @@ fn wake_is_symmetric() {
     }
 }
 
-/// The same wake wherever the ship is and whatever its course, seen from the ship.
+/// Seen from the ship, the wake is the same wherever the ship is and whatever its course.
 #[test]
 fn wake_goes_with_the_ship() {
     let reference = KelvinWake {
@@ -480,7 +480,7 @@ fn wake_goes_with_the_ship() {
             track: Track::new(place, heading, 0.0),
             ..reference
         };
-        // A raster around the ship: the phases of a distant one are cut to what reaches it.
+        // A raster around the ship: the waves of a distant ship are limited to those that reach it.
         let around = Raster {
             origin_row: 200 + (place[1] / 2.5) as i64,
             origin_column: 200 - (place[0] / 2.5) as i64,
@@ -505,8 +505,8 @@ fn wake_moves_with_time() {
     assert!((later.position[1] - expected[1]).abs() < 1e-12);
 }
 
-/// Aft of the bow the surface first rises: the bow wave begins with a crest. A ship of forty wavelengths, so
-/// that the stern's waves are weak at the bow.
+/// Aft of the bow the surface first rises: the bow wave begins with a crest. The ship is forty wavelengths long, so that the
+/// stern's waves are weak at the bow.
 #[test]
 fn bow_wave_begins_with_a_crest() {
     let ship = KelvinWake {
@@ -571,8 +571,8 @@ fn arms_open_at_the_kelvin_angle() {
     }
 }
 
-/// The plan names the longest and the shortest of its waves: around the ship, below and above the critical speed of 14 m/s,
-/// and far astern at the cusp, where only waves of some 35° arrive.
+/// The plan states the longest and the shortest of its waves: around the ship, below and above the critical speed of 14 m/s, and
+/// far astern at the cusp, where only waves of some 35° arrive.
 #[test]
 fn the_plan_names_its_longest_and_shortest_wave() {
     let raster = Raster::image(24, 24, 2.0);
@@ -594,7 +594,7 @@ fn the_plan_names_its_longest_and_shortest_wave() {
             let k = x.hypot(*y);
             (smallest, largest) = (k.min(smallest), k.max(largest));
         }
-        // Where the curve begins off the axis, with k = 0, the rounding of u shows there.
+        // Where the curve begins off the axis, with k = 0, the rounding of u shows.
         let allowed = if speed > 14.0 {
             1e-6 * largest
         } else {
@@ -618,9 +618,9 @@ fn the_plan_names_its_longest_and_shortest_wave() {
     }
 }
 
-/// Steepness k a of the envelope 500 m astern as another programme has it, for 195 × 26 × 10 m at 10 m/s; at one length of the ship
-/// it is √(500/195) times that, less the factor |1 − 4 sinh²u/cosh 2u| that the limit leaves out. What is left of the amplitude
-/// follows; the long waves of the cusp keep most of theirs.
+/// Steepness k a of the envelope 500 m astern by another programme, for 195 × 26 × 10 m at 10 m/s; at one ship length it is
+/// √(500/195) times that, apart from the factor |1 − 4 sinh²u/cosh 2u| that the limit omits. The amplitude that is left follows;
+/// the long waves of the cusp keep most of theirs.
 #[test]
 fn steep_waves_break_and_long_ones_stay() {
     let limited = KelvinWake {

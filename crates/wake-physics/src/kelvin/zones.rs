@@ -1,26 +1,26 @@
-//! Which part of the curve of steady waves reaches a raster.
+//! The part of the curve of steady waves that reaches a raster.
 //!
-//! The phase of wave u at the place (ξ, η) is αξ + βη; only where its derivative along the curve vanishes
-//! (stationary phase) does a wave reach the place. Seen from far away a raster receives a short piece of the
-//! curve. What lies outside may be cut off, if the cut is smooth over many periods.
+//! The phase of wave u at the place (ξ, η) is αξ + βη; a wave reaches a place only where the derivative of its phase along the
+//! curve vanishes (stationary phase). A distant raster receives a short piece of the curve. The rest may be cut off, if the cut
+//! is smooth over many periods.
 
 use super::steady::SteadyWaves;
 use crate::numeric::{GaussLegendre, root, smallest_at};
 
-/// Samples of the curve between which a change of sign is looked for.
+/// Number of samples of the curve between which a change of sign is searched.
 const SAMPLES: usize = 400;
 
-/// Steps of the searches for zeros and valleys.
+/// Steps of the searches for zeros and for minima.
 const HALVINGS: usize = 50;
 const THIRDS: usize = 40;
 
-/// Places of interest, seen from the ship, and how fast phases turn there along the curve.
+/// Places of interest as seen from the ship, and the rate at which phases turn there along the curve.
 #[derive(Debug, Clone)]
 pub(crate) struct Reach {
     waves: SteadyWaves,
     /// Corners (ξ, η) of a convex region \[m\].
     corners: Vec<[f64; 2]>,
-    /// Half the length of the hull \[m\]: bow and stern are sources of their own.
+    /// Half the length of the hull \[m\]: bow and stern are separate sources.
     half_length: f64,
     /// Depth over which the hull and the filter weaken short waves \[m\].
     decay: f64,
@@ -83,15 +83,15 @@ impl Reach {
         low.max(-high).max(0.0)
     }
 
-    /// A bound on how fast the integrand turns at u: phases, window, decay and the change of the amplitude.
+    /// Bound on the rate at which the integrand turns at u: phases, window, decay and change of the amplitude.
     pub(crate) fn fastest(&self, u: f64) -> f64 {
         let [low, high] = self.range(u);
         let decay = self.decay * self.waves.at(u).rates[0].abs();
         low.abs().max(high.abs()) + self.slowest(u) + decay + 6.0
     }
 
-    /// Pieces of [from, to] that matter, each reaching `phase` radians beyond what is stationary before its
-    /// end falls, over `phase` more. The ends of the curve are sharp and matter too.
+    /// Pieces of [from, to] that matter. Each reaches `phase` radians beyond its stationary points before its end falls, over
+    /// `phase` more. The ends of the curve are sharp and matter, too.
     pub(crate) fn pieces(&self, [from, to]: [f64; 2], phase: f64) -> Vec<Piece> {
         let mut out: Vec<Piece> = Vec::new();
         for seed in self.seeds([from, to]) {
@@ -108,7 +108,7 @@ impl Reach {
         out
     }
 
-    /// The ends, runs of stationary samples, changes of sign and the slowest points between, in order.
+    /// Ends, runs of stationary samples, changes of sign and the slowest points between, in order.
     fn seeds(&self, [from, to]: [f64; 2]) -> Vec<[f64; 2]> {
         let at = |i: usize| from + (to - from) * i as f64 / SAMPLES as f64;
         let middle = |u: f64| {
@@ -152,8 +152,8 @@ impl Reach {
         }
     }
 
-    /// From `start` toward `limit`: where the phase has turned by 2·`phase`, and where by `phase`; both are
-    /// `limit` if it comes first.
+    /// Points from `start` toward `limit` where the phase has turned by 2·`phase`, and by `phase`; both are `limit` if it comes
+    /// first.
     fn end_of(&self, start: f64, limit: f64, phase: f64) -> [f64; 2] {
         let rule = GaussLegendre::new(4);
         let (mut turned, mut begin, span) = (0.0, start, limit - start);
@@ -166,7 +166,7 @@ impl Reach {
                 begin + step
             };
             if (end - begin).abs() <= f64::EPSILON * begin.abs() {
-                // Phases turn within the rounding of u: a ship too far to be resolved.
+                // Phases turn within the rounding of u: the ship is too far away to be resolved.
                 return [begin, fall.unwrap_or(begin)];
             }
             let more = rule.integrate([begin, end], |u| self.slowest(u)).abs();
@@ -188,7 +188,7 @@ impl Reach {
     }
 }
 
-/// Intervals that touch, joined.
+/// Joins intervals that touch.
 fn merged(mut seeds: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     seeds.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let mut out: Vec<[f64; 2]> = Vec::new();
@@ -206,8 +206,8 @@ mod tests {
     use super::*;
     use std::f64::consts::PI;
 
-    /// One place (ξ, 0) of deep water sees α = ν cosh u alone: its phase turns by |ξ| ν sinh u, twice that and 6 more bound
-    /// the integrand, with hull and decay their own.
+    /// At one place (ξ, 0) of deep water only α = ν cosh u matters: its phase turns by |ξ| ν sinh u. Twice that and 6 more bound
+    /// the integrand, with further terms for hull and decay.
     #[test]
     fn how_fast_waves_turn_on_the_track() {
         let nu = crate::constants::GRAVITY / 25.0;
@@ -226,8 +226,8 @@ mod tests {
         }
     }
 
-    /// ½ erfc(s(1 − 2x)) at the share x of a smooth end, by its continued fraction: the tail keeps its relative digits where
-    /// ½ + ½ erf leaves the rounding of 1.
+    /// A smooth end is ½ erfc(s(1 − 2x)) at its fraction x, compared with a continued fraction: the tail keeps its relative
+    /// digits, where ½ + ½ erf leaves the rounding of 1.
     #[test]
     fn smooth_ends_are_error_functions() {
         let piece = Piece {
@@ -242,7 +242,7 @@ mod tests {
             let fraction = (1..400).rev().fold(z, |f, n| z + 0.5 * f64::from(n) / f);
             let tail = 0.5 * (-z * z).exp() / (PI.sqrt() * fraction);
             let found = [0.05, 0.95].map(|x| piece.window(2.0 + 0.2 * x, sharpness));
-            // Two roundings of numbers near 1, and u has its own.
+            // Two roundings of numbers near 1, and the rounding of u.
             assert!(
                 (found[0] - tail).abs() < 5e-16 + 1e-12 * tail,
                 "{sharpness}"

@@ -1,9 +1,9 @@
-//! Rays and convex polygons cut to a rectangle.
+//! Clipping of rays and convex polygons to a rectangle.
 
 use crate::raster::Raster;
 
-/// The rectangle of the pixel centres \[m\]; where an image has one row or one column of several pixels, that of their
-/// edges there, so that what crosses it has a length and a box.
+/// Rectangle of the pixel centres \[m\]. An image with one row or one column of several pixels reaches to the edges of the pixels
+/// across it, so that what crosses the image has a length and a box.
 pub(super) struct Rectangle {
     low: [f64; 2],
     high: [f64; 2],
@@ -31,11 +31,11 @@ impl Rectangle {
         (0..2).all(|a| (self.low[a]..=self.high[a]).contains(&point[a]))
     }
 
-    /// The part of a ray inside, from its start outward and no farther than `longest`; `None` if it has no length.
+    /// Part of a ray inside, from its start outward and no longer than `longest`; `None` if it has no length.
     ///
     /// - `along`: a unit vector
     ///
-    /// Liang and Barsky (1984), ACM Trans. Graph. 3: every side cuts the ray's parameter.
+    /// Liang and Barsky (1984), ACM Trans. Graph. 3: every side clips the ray's parameter.
     pub(super) fn clip_ray(
         &self,
         from: [f64; 2],
@@ -54,7 +54,7 @@ impl Rectangle {
             }
         }
         let at = |t: f64| {
-            // Rounding must not put an end outside.
+            // Rounding must not move an end outside.
             [0, 1].map(|a| (from[a] + t * along[a]).clamp(self.low[a], self.high[a]))
         };
         (start < end && end.is_finite()).then(|| [at(start), at(end)])

@@ -1,4 +1,4 @@
-//! The outline of a wake behind a ship that turns: points along its past track, joined by straight lines.
+//! Outline of a wake behind a turning ship: points along its past track, joined by straight lines.
 
 use super::clip::Polygon;
 use super::visibility::Extent;
@@ -8,12 +8,12 @@ use crate::kelvin::{KELVIN_ANGLE, KelvinWake};
 use crate::track::Track;
 use std::f64::consts::PI;
 
-/// Parts of an outline: chosen; a half circle of them leaves its chords by 0.2 % of the radius.
+/// Number of parts of an outline (chosen): on a half circle, the chords deviate by 0.2 % of the radius.
 const PARTS: usize = 24;
 
-/// Where the waves on the arms are, seen from the place where they were sent, per distance that the ship has run since.
+/// Place of the waves on the arms relative to where they were sent, per distance that the ship has run since.
 ///
-/// They have the steepest ray of all, and go r = `c_g`/c cos θ of that distance in their own direction θ:
+/// These waves have the steepest ray, and travel r = `c_g`/c cos θ of that distance in their own direction θ:
 ///
 /// ```text
 /// forward r cos θ, aside r sin θ          deep water: 1/3 and √2/6
@@ -25,7 +25,7 @@ struct Arms {
 }
 
 impl Arms {
-    /// Those of a wake, as far as a pixel carries its waves (k up to `largest` [rad/m]).
+    /// Arms of a wake, for the waves that a pixel carries (k up to `largest` [rad/m]).
     fn of(wake: &KelvinWake, largest: f64) -> Self {
         let rays = wake.rays(largest);
         let steepest = rays.iter().max_by(|a, b| a.tangent.total_cmp(&b.tangent));
@@ -47,13 +47,13 @@ impl Arms {
     }
 }
 
-/// What is seen of a wake: convex pieces cut to the image, each with the distance astern of the bow at which it ends \[m\].
+/// Visible parts of a wake: convex pieces cut to the image, each with the distance astern of the bow at which it ends \[m\].
 type Pieces = Vec<(Polygon, f64)>;
 
 impl Frame<'_> {
-    /// The wake of a ship that turns.
+    /// Label of the wake of a turning ship.
     ///
-    /// - `opening` half-angle of the wedge \[rad\]
+    /// - `opening`: half-angle of the wedge \[rad\]
     pub(super) fn curved_wake(
         &self,
         wake: &KelvinWake,
@@ -75,7 +75,7 @@ impl Frame<'_> {
         }
     }
 
-    /// The track up to a distance astern of the bow, from another, as far as it is in the image.
+    /// Track between two distances astern of the bow, as far as it is in the image.
     fn track_line(&self, track: &Track, bow: f64, [from, to]: [f64; 2]) -> Vec<Pixel> {
         if to <= from {
             return Vec::new();
@@ -87,7 +87,7 @@ impl Frame<'_> {
         self.line_inside(&(0..=PARTS).map(at).collect::<Vec<_>>())
     }
 
-    /// Places of an arm up to a distance astern of the bow: `side` 1 to port, −1 to starboard.
+    /// Points of an arm up to a distance astern of the bow; `side` is 1 to port, −1 to starboard.
     fn arm(track: &Track, bow: f64, arms: Arms, side: f64, end: f64) -> Vec<[f64; 2]> {
         let longest = end / (1.0 - arms.forward);
         let at = |n: usize| {
@@ -115,7 +115,7 @@ impl Frame<'_> {
         self.strip(&port, &starboard, end)
     }
 
-    /// The dark line, `half_width` wide on both sides, in pieces.
+    /// The dark line, `half_width` to each side, in pieces.
     fn band(&self, track: &Track, bow: f64, half_width: f64, end: f64) -> Pieces {
         if end <= 0.0 {
             return Vec::new();

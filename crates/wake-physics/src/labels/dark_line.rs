@@ -5,11 +5,11 @@ use crate::turbulent::TurbulentWake;
 use crate::turbulent::current::WakeEdge;
 use std::f64::consts::{PI, SQRT_2};
 
-/// Places across a window at which a change is computed.
+/// Number of places across a window at which a change is computed.
 const PLACES: usize = 16;
 
-/// Standard deviations of the damping, smeared, beyond which edges are not looked for: their current has fallen to
-/// e⁻⁸ of its largest.
+/// Distance beyond which edges are ignored, in standard deviations of the smeared damping: their current has fallen to e⁻⁸ of its
+/// maximum.
 const FARTHEST_EDGE: f64 = 8.0;
 
 /// The turbulent wake as the radar shows it, smeared in azimuth: its dark line and its edges.
@@ -17,7 +17,7 @@ pub(super) struct DarkLine {
     pub(super) wake: TurbulentWake,
     /// The edges, if they are drawn.
     pub(super) edge: Option<WakeEdge>,
-    /// Share of the intensity that full damping takes away, 0 if the dark line is not drawn.
+    /// Share of the intensity that full damping removes, 0 if the dark line is not drawn.
     damped: f64,
     /// Share of the intensity that the edges multiply.
     multiplied: f64,
@@ -25,17 +25,17 @@ pub(super) struct DarkLine {
     smear: f64,
 }
 
-/// The dark line at a distance, and the waves that are missing in it.
+/// The dark line at a distance, and the change by the ship's short waves there.
 pub(super) struct DarkNearby<'a> {
     pub(super) line: &'a DarkLine,
     pub(super) short: Option<&'a Profile>,
 }
 
 impl DarkLine {
-    /// As an image shows it.
+    /// Dark line as an image shows it.
     ///
-    /// - `edge`: its edges, if they are drawn
-    /// - `damped`, `multiplied`: shares of the intensity that full damping takes away, and that the edges multiply
+    /// - `edge`: edges of the wake, if they are drawn
+    /// - `damped`, `multiplied`: shares of the intensity that full damping removes and that the edges multiply
     /// - `resolution`: azimuth resolution \[m\]
     pub(super) fn new(
         wake: TurbulentWake,
@@ -48,7 +48,7 @@ impl DarkLine {
             edge,
             damped,
             multiplied,
-            // The track's port side leans on azimuth by its y component.
+            // The smear acts along azimuth: take the y component of the direction to port.
             smear: deviation * wake.track.port()[1].abs(),
             wake,
         }
@@ -60,14 +60,14 @@ impl DarkLine {
         [own, own.hypot(self.smear)]
     }
 
-    /// Two standard deviations of the damping \[m\]; three with edges, which are strongest at two.
+    /// Half-width \[m\]: two standard deviations of the damping, or three with edges, which are strongest at two.
     pub(super) fn half_width(&self, distance: f64) -> f64 {
         let reach = if self.edge.is_some() { 3.0 } else { 2.0 };
         reach * self.deviations(distance)[1]
     }
 
-    /// Mean squares of the change over a window around a place `off` the track \[m\], `width` wide: by the turbulent wake, by
-    /// the ship's short waves, and by both.
+    /// Mean squared changes over a window `width` wide around a place `off` the track \[m\]: by the turbulent wake, by the ship's
+    /// short waves, and by both.
     pub(super) fn mean_squares(
         &self,
         distance: f64,
@@ -87,7 +87,7 @@ impl DarkLine {
         sums.map(|sum| sum / PLACES as f64)
     }
 
-    /// What the ship's short waves add at a place, smeared.
+    /// Smeared change by the ship's short waves at a place.
     fn short(&self, profile: &Profile, at: f64) -> f64 {
         if at.abs() > profile.reach() + 3.0 * self.smear {
             return 0.0;
@@ -95,14 +95,14 @@ impl DarkLine {
         self.multiplied * self.smeared(profile.step(), at, |port| profile.at(port))
     }
 
-    /// What damping takes away at a place.
+    /// Smeared decrease by damping at a place.
     fn damping(&self, distance: f64, at: f64) -> f64 {
         let [own, wide] = self.deviations(distance);
         let centre = self.wake.suppression.damping(self.wake.speed, distance);
         self.damped * centre * own / wide * (-0.5 * (at / wide).powi(2)).exp()
     }
 
-    /// What the edges add at a place to what damping leaves there.
+    /// Smeared change by the edges at a place, acting on what damping leaves there.
     fn edges(&self, distance: f64, at: f64) -> f64 {
         let [own, wide] = self.deviations(distance);
         let Some(edge) = self.edge.filter(|_| at.abs() < FARTHEST_EDGE * wide) else {
@@ -117,7 +117,7 @@ impl DarkLine {
         self.multiplied * self.smeared(own / 3.0, at, change)
     }
 
-    /// The mean of a change over the smear, by a sum in steps of half its deviation, or of `finest`.
+    /// Mean of a change over the smear, by a sum in steps of half its standard deviation, or of `finest` if that is smaller.
     fn smeared(&self, finest: f64, at: f64, change: impl Fn(f64) -> f64) -> f64 {
         let step = (0.5 * self.smear).min(finest);
         let half = if step > 0.0 {
@@ -145,8 +145,8 @@ mod tests {
     use crate::turbulent::current::{EdgeResponse, WakeCurrent, WakeEdge};
     use crate::turbulent::{Suppression, TurbulentWake};
 
-    /// The mean square over windows across the track, by sums over the damping itself and a Gaussian smear, at places
-    /// ten times closer. The window's 16 places leave a thousandth where it is no wider than the line.
+    /// Mean squares over windows across the track agree with sums over the damping itself and a Gaussian smear, at places ten
+    /// times closer. The window's 16 places leave an error of a thousandth where the window is no wider than the line.
     #[test]
     fn the_dark_line_of_a_window_is_that_of_the_smeared_wake() {
         let wake = TurbulentWake {
@@ -189,8 +189,8 @@ mod tests {
         }
     }
 
-    /// What edges add is their factor on what damping leaves, smeared: by a sum over the smear with steps of 0.1 m to ten
-    /// deviations. The sum that labels take ends at three, where 0.3 % of the weight is left.
+    /// Edges contribute their factor on what damping leaves, smeared: compared with a sum over the smear in steps of 0.1 m to ten
+    /// standard deviations. The sum for labels ends at three, where 0.3 % of the weight is left.
     #[test]
     fn edges_add_their_factor_on_what_damping_leaves() {
         let wake = TurbulentWake {
@@ -234,7 +234,7 @@ mod tests {
             largest = largest.max(expected.abs());
         }
         assert!(largest > 0.1, "{largest}");
-        // Beyond eight deviations there is nothing.
+        // Beyond eight standard deviations there is no change.
         assert!(line.edges(300.0, 1e3).abs() < f64::MIN_POSITIVE);
     }
 }

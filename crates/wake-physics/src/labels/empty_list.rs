@@ -1,4 +1,4 @@
-//! An absent value as an empty list.
+//! Serialisation of an absent value as an empty list.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 

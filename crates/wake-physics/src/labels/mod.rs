@@ -1,8 +1,8 @@
-//! What is where in an image: ships, their echoes and wakes, in metres and pixels, and whether they can be seen.
+//! Labels of an image: ships, their echoes and wakes, in metres and pixels, and whether they are visible.
 //!
-//! Pixels are (column, row), whole numbers at the centres; everything is cut to the rectangle of the centres,
-//! columns 0 to `columns − 1` and rows 0 to `rows − 1`. What is not in the image, or not to be seen in it, is an empty
-//! list. `visibility` says how far a wake is seen, `clip` cuts.
+//! Pixels are (column, row), with whole numbers at the centres. Everything is cut to the rectangle of the centres, columns 0 to
+//! `columns − 1` and rows 0 to `rows − 1`. What is outside the image or not visible is an empty list. `visibility` computes how
+//! far a wake is visible, `clip` cuts.
 
 mod clip;
 mod curve;
@@ -26,10 +26,10 @@ pub use visibility::Visibility;
 /// A place in the image, (column, row), with fractions.
 pub type Pixel = [f64; 2];
 
-/// A line from one place in the image to another, with places between where it bends.
+/// A line between two places in the image, with further places where it bends.
 pub type Line = Vec<Pixel>;
 
-/// Which class of a detector an object is.
+/// Detector class of an object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Class {
     /// A wake, number 0.
@@ -39,7 +39,7 @@ pub enum Class {
 }
 
 impl Class {
-    /// Its number in data sets.
+    /// Class number in data sets.
     #[must_use]
     pub fn number(self) -> u32 {
         match self {
@@ -48,7 +48,7 @@ impl Class {
         }
     }
 
-    /// Its name in data sets.
+    /// Class name in data sets.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -58,7 +58,7 @@ impl Class {
     }
 }
 
-/// One thing that a detector is to find.
+/// An object that a detector should find.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Object {
     /// Class of the object.
@@ -68,13 +68,13 @@ pub struct Object {
     /// Corners of the box along the track: port ahead, starboard ahead, starboard astern, port astern; they may lie
     /// outside the image.
     pub oriented_box_px: [Pixel; 4],
-    /// The bow, if in the image; for a ship the bow of its echo.
+    /// The bow, if in the image; for a ship, the bow of its echo.
     pub tip: Option<Pixel>,
-    /// From the tip along the thing [deg clockwise from the image's up], 0 up to 360.
+    /// Direction from the tip along the object [deg clockwise from the image's up], 0 up to 360.
     pub axis_deg: f64,
     /// Angle between axis and arms \[deg\]; 0 for a ship.
     pub half_angle_deg: f64,
-    /// Length along the axis from the tip, seen in the image \[pixels\]; of a ship the whole.
+    /// Visible length along the axis from the tip \[pixels\]; for a ship, the whole length.
     pub length_px: f64,
     /// Visibility of a wake; `None` for a ship.
     pub visibility: Option<Visibility>,
@@ -84,18 +84,18 @@ pub struct Object {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Labels {
-    /// The ships of the scene, each with its wake; also those outside the image.
+    /// Ships of the scene, each with its wake, including ships outside the image.
     pub ships: Vec<LabelledShip>,
-    /// Azimuth by which a radar displaces the whole sea, its wakes too, by the sea's mean Doppler shift \[m\]: (R/V) times
-    /// its mean velocity toward the radar; 0 for a sea that returns nothing. It is left out of the simulated image. In a
-    /// real one the offset of a ship from its wake is `azimuth_displacement_m` less this.
+    /// Azimuth displacement of the whole sea, wakes included, by the sea's mean Doppler shift \[m\]: (R/V) times its mean
+    /// velocity toward the radar; 0 for a sea that returns nothing. The simulated image leaves it out. In a real image, the
+    /// offset of a ship from its wake is `azimuth_displacement_m` minus this value.
     #[serde(default)]
     pub sea_displacement_m: f64,
 }
 
 /// A ship and its wake.
 ///
-/// The keys are always the same; what is not there is an empty list, a missing number is null.
+/// All keys are always present; an absent value is an empty list, a missing number is null.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LabelledShip {
@@ -114,10 +114,10 @@ pub struct ShipLabel {
     /// Midship, if in the image.
     #[serde(with = "empty_list")]
     pub position_px: Option<Pixel>,
-    /// Midship displaced in azimuth, where the radar sees the ship; if in the image.
+    /// Midship displaced in azimuth, where the radar images the ship; if in the image.
     #[serde(with = "empty_list")]
     pub echo_px: Option<Pixel>,
-    /// Box (x, y, width, height) of the hull where the radar sees it, cut to the image; if the echo is drawn.
+    /// Box (x, y, width, height) of the hull where the radar images it, cut to the image; if the echo is drawn.
     #[serde(with = "empty_list")]
     pub echo_box_px: Option<[f64; 4]>,
     /// Corners of the hull itself at that place, port ahead first and clockwise seen from above; they may lie outside
@@ -130,47 +130,48 @@ pub struct ShipLabel {
     pub speed: f64,
     /// Length \[m\].
     pub length: f64,
-    /// Azimuth of the echo less that of the ship \[m\].
+    /// Azimuth of the echo minus azimuth of the ship \[m\].
     pub azimuth_displacement_m: f64,
 }
 
 /// Place of a wake and its visible extent.
 ///
-/// Arms, centreline and boxes end where the wake does: at the last window that shows waves or the dark line clearly
-/// enough, not at the edge of the image.
+/// Arms, centreline and boxes end with the visible wake, at the last window that shows waves or the dark line clearly enough, not
+/// at the edge of the image.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WakeLabel {
     /// The bow, from which the arms start; if in the image.
     #[serde(with = "empty_list")]
     pub tip_px: Option<Pixel>,
-    /// From the tip along the wake [deg clockwise from the image's up], 0 up to 360, of a ship that turns along its tangent;
-    /// null for a ship at rest.
+    /// Direction from the tip along the wake [deg clockwise from the image's up], 0 up to 360, along the tangent for a turning
+    /// ship; null for a ship at rest.
     pub axis_deg: Option<f64>,
     /// Angle between axis and arms \[deg\], see [`half_angle`]; null for a ship at rest.
     pub half_angle_deg: Option<f64>,
-    /// The Kelvin arms as far as waves are seen, port before starboard, each from the ship outward: two places, or a line of
-    /// more behind a ship that turns.
+    /// Kelvin arms as far as waves are visible, port before starboard, each from the ship outward: two places, or more behind a
+    /// turning ship.
     pub arms_px: Vec<Line>,
-    /// The track line as far as the wake is seen, from the stern backward, likewise; no place where nothing is seen.
+    /// Track line as far as the wake is visible, from the stern backward: two places, or more behind a turning ship; empty where
+    /// nothing is visible.
     pub centreline_px: Line,
-    /// Distance along the axis from the tip to the end of what is seen in the image \[pixels\]; 0 if nothing is.
+    /// Distance along the axis from the tip to the end of the visible wake in the image \[pixels\]; 0 if nothing is visible.
     pub length_px: f64,
     /// Visibility of the wake; null where it does not meet the image.
     pub visibility: Option<Visibility>,
-    /// Box (x, y, width, height) of what is seen: the wedge between the arms, the dark line, or both.
+    /// Box (x, y, width, height) of the visible wake: the wedge between the arms, the dark line, or both.
     #[serde(with = "empty_list")]
     pub box_px: Option<[f64; 4]>,
-    /// Smallest box with a side along the track around the same; its corners may lie outside the image.
-    /// Port ahead first, then starboard ahead, starboard astern, port astern.
+    /// Smallest box around the visible wake with a side along the track; its corners may lie outside the image. Port ahead first,
+    /// then starboard ahead, starboard astern, port astern.
     #[serde(with = "empty_list")]
     pub oriented_box_px: Option<[Pixel; 4]>,
 }
 
 /// Labels of a valid scene, without simulating it.
 ///
-/// An echo is displaced by the ship's own motion, a wake is not: its water only oscillates, so that the mean
-/// displacement over a wave is zero in linear theory.
+/// An echo is displaced by the ship's own motion. A wake is not: its water only oscillates, so the mean displacement over a wave
+/// is zero in linear theory.
 #[must_use]
 pub fn labels_of(scene: &Scene) -> Labels {
     labels(&Prepared::new(scene))
@@ -262,14 +263,15 @@ struct Frame<'a> {
     raster: &'a Raster,
     image: Rectangle,
     position: [f64; 2],
-    /// [deg clockwise from azimuth].
+    /// Heading [deg clockwise from azimuth].
     heading: f64,
     ahead: [f64; 2],
     starboard: [f64; 2],
 }
 
 impl<'a> Frame<'a> {
-    /// - `position` (x, y) \[m\] of midship; `heading` [deg clockwise from azimuth]
+    /// - `position`: midship (x, y) \[m\]
+    /// - `heading`: [deg clockwise from azimuth]
     fn new(position: [f64; 2], heading: f64, raster: &'a Raster) -> Self {
         let [x, y] = direction(heading);
         Self {
@@ -282,7 +284,7 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// The point `ahead` and `starboard` of another \[m\].
+    /// Point `ahead` and `starboard` of another point \[m\].
     fn offset(&self, from: [f64; 2], ahead: f64, starboard: f64) -> [f64; 2] {
         [0, 1].map(|a| from[a] + ahead * self.ahead[a] + starboard * self.starboard[a])
     }
@@ -318,7 +320,7 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// - `opening` half-angle of the wedge \[rad\]
+    /// - `opening`: half-angle of the wedge \[rad\]
     fn wake(&self, ship: &Ship, opening: f64, extent: &Extent) -> WakeLabel {
         if ship.speed <= 0.0 {
             return WakeLabel::default();
@@ -360,10 +362,12 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// The label of a wake without its lines and its visibility.
+    /// Label of a wake without its lines and its visibility.
     ///
-    /// - `bow` (x, y) \[m\]; `opening` half-angle of the wedge \[rad\]
-    /// - `seen`: what is seen of it; `length` of that along the axis \[m\], where it has an area
+    /// - `bow`: (x, y) \[m\]
+    /// - `opening`: half-angle of the wedge \[rad\]
+    /// - `seen`: visible parts of the wake
+    /// - `length`: visible length along the axis \[m\], used where the visible wake has an area
     fn outlined(&self, bow: [f64; 2], opening: f64, seen: &[Polygon], length: f64) -> WakeLabel {
         let box_px = self.upright_box(seen);
         WakeLabel {
@@ -392,7 +396,7 @@ impl<'a> Frame<'a> {
 
     /// (x, y, width, height) of the upright box around polygons; `None` if it has no area.
     fn upright_box(&self, polygons: &[Polygon]) -> Option<[f64; 4]> {
-        // Range grows with the column, azimuth falls with the row.
+        // Range increases with the column, azimuth decreases with the row.
         let [left, right] = extent_of(polygons, [1.0, 0.0]);
         let [bottom, top] = extent_of(polygons, [0.0, 1.0]);
         let [x0, y0] = self.pixel([left, top]);
@@ -414,7 +418,7 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// Smallest and largest coordinate along a unit vector; without a polygon the first is the larger.
+/// Smallest and largest coordinate along a unit vector; ∞ and −∞ without polygons.
 fn extent_of(polygons: &[Polygon], axis: [f64; 2]) -> [f64; 2] {
     let start = [f64::INFINITY, f64::NEG_INFINITY];
     polygons.iter().fold(start, |[low, high], polygon| {

@@ -1,17 +1,18 @@
-//! Rows of windows behind a ship in which its wake is looked for.
+//! Rows of windows behind a ship in which its wake is searched.
 
 use crate::raster::Raster;
 use crate::track::Track;
 use std::ops::Range;
 
-/// Rows of windows beyond which one cannot be told from the next: their numbers round to 2⁻⁴ of a row.
+/// Row number beyond which rows are not resolved: numbers round to 2⁻⁴ of a row.
 const FARTHEST_ROW: f64 = (1u64 << 48) as f64;
 
-/// The rows of windows, counted from the stern, that may hold a place of the image. Their number does not grow with the distance
-/// of the ship: those that the image is long along a straight track, and those of half a circle.
+/// Rows of windows, counted from the stern, that may hold a place of the image. Their number does not grow with the distance of
+/// the ship: it is bounded by the length of the image along a straight track, and by half a circle along a turn.
 ///
-/// - `half_length` of the hull, `step` from row to row \[m\]
-/// - none where the ship is so far that rows cannot be told apart
+/// - `half_length`: half the length of the hull \[m\]
+/// - `step`: distance from row to row \[m\]
+/// - returns no rows where the ship is so far away that rows are not resolved
 pub(super) fn rows_in(
     track: &Track,
     raster: &Raster,

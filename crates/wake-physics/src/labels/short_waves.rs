@@ -1,7 +1,8 @@
-//! How much brighter the sea is where a ship's waves roughen it.
+//! Increase of the sea's brightness where a ship's waves roughen it.
 //!
-//! σ⁰ is steeper for slopes toward the radar than away from it, so waves of any length raise its mean: those that the pixels do not
-//! carry, and just as much those that they carry but the image smears, such as the divergent waves of a ship along the flight.
+//! σ⁰ changes more for slopes toward the radar than for slopes away from it, so waves of any length raise its mean: waves that
+//! the pixels do not carry, and equally waves that they carry but the image smears, such as the divergent waves of a ship along
+//! the flight.
 
 use crate::effects::Effects;
 use crate::kelvin::{KelvinWake, SubpixelWake};
@@ -12,34 +13,36 @@ use crate::scene::Term;
 use std::f64::consts::PI;
 use std::sync::OnceLock;
 
-/// Rays from the track to the outermost one at which the change is known: chosen, it is smooth but where waves break.
+/// Number of rays from the track to the outermost ray at which the change is computed (chosen); it is smooth except where waves
+/// break.
 const RAYS: usize = 24;
 
-/// Slope variance below which nothing is to be seen: σ⁰ changes by at most some hundreds of it.
+/// Slope variance below which nothing is visible: σ⁰ changes by at most some hundreds times the variance.
 const LEAST_VARIANCE: f64 = 1e-5;
 
-/// Directions of waves, over half a circle, and variances of their slopes at which the change is computed: between them its
-/// logarithm is as smooth as a cubic, and a line.
+/// Directions of waves, over half a circle, and variances of their slopes at which the change is computed. Between them, its
+/// logarithm is interpolated by a cubic in direction and linearly in variance.
 const DIRECTIONS: usize = 20;
 const VARIANCES: [f64; 12] = [
     0.002, 0.004, 0.007, 0.01, 0.0135, 0.017, 0.0205, 0.024, 0.028, 0.032, 0.036, 0.04,
 ];
 
-/// What a variance of slopes makes of the mean σ⁰ of a sea.
+/// Change of a sea's mean σ⁰ by a variance of slopes.
 #[derive(Debug)]
 pub(super) struct ShortWaves {
-    /// The waves of each ship, of all lengths that are drawn.
+    /// Waves of each ship, of all lengths that are drawn.
     waves: Vec<Option<SubpixelWake>>,
-    /// Averaged over all slopes of the sea.
+    /// Backscatter averaged over all slopes of the sea.
     backscatter: Backscatter,
     /// The mean σ⁰, Bragg and specular \[1\], above 0.
     mean: f64,
-    /// ln of σ⁰ over its mean, by direction and variance; computed when the first waves count.
+    /// ln of σ⁰ over its mean, by direction and variance; computed on first use.
     table: OnceLock<[[f64; VARIANCES.len()]; DIRECTIONS]>,
 }
 
 impl ShortWaves {
-    /// Those of a sea whose models average over all its slopes; `None` if no such waves are drawn.
+    /// Short waves on a sea whose models average over all its slopes; `None` if no such waves are drawn or the sea returns
+    /// nothing.
     pub(super) fn new(
         models: &Models,
         effects: &Effects,
@@ -65,14 +68,14 @@ impl ShortWaves {
         })
     }
 
-    /// The waves of a ship that are steep enough to count.
+    /// Waves of a ship, if they are steep enough to count.
     pub(super) fn of(&self, ship: usize) -> Option<WavesOfShip<'_>> {
         let waves = self.waves[ship].as_ref()?;
         let strongest = waves.steepest(0.5 * waves.length());
         (strongest >= LEAST_VARIANCE).then_some(WavesOfShip { sea: self, waves })
     }
 
-    /// Relative change of σ⁰ by waves of one direction, a variance of slopes xx, xy and yy \[1\].
+    /// Relative change of σ⁰ by waves of one direction with the slope variances xx, xy and yy \[1\].
     fn change(&self, [xx, xy, yy]: [f64; 3]) -> f64 {
         let table = self.table.get_or_init(|| self.tabulated());
         let direction = 0.5 * (2.0 * xy).atan2(xx - yy) / PI * DIRECTIONS as f64;
@@ -108,7 +111,7 @@ impl ShortWaves {
         table
     }
 
-    /// Mean σ⁰ with a variance of slopes over that without \[1\].
+    /// Mean σ⁰ with a variance of slopes over mean σ⁰ without it \[1\].
     fn ratio(&self, [xx, xy, yy]: [f64; 3]) -> f64 {
         let [bragg, specular] = self.backscatter.mean_over(&SlopeCovariance { xx, xy, yy });
         (bragg + specular) / self.mean
@@ -128,7 +131,7 @@ impl WavesOfShip<'_> {
         let reach = self.waves.widest() * distance;
         let step = reach / RAYS as f64;
         let change = |n: usize, side: f64| {
-            // In the middle of steps: the outermost ray itself is beyond the waves.
+            // At the middle of steps: the outermost ray itself is beyond the waves.
             let port = side * (n as f64 + 0.5) * step;
             let place = wake.track.on_sea([-distance, port]);
             let rough = self.waves.at(place);
@@ -146,7 +149,7 @@ impl WavesOfShip<'_> {
 #[derive(Debug)]
 pub(super) struct Profile {
     step: f64,
-    /// In steps to port, and to starboard.
+    /// Changes in steps to port, and to starboard.
     sides: [Vec<f64>; 2],
 }
 
@@ -156,7 +159,7 @@ impl Profile {
         self.step * RAYS as f64
     }
 
-    /// Distance between two places at which the change is known \[m\].
+    /// Distance between places at which the change is computed \[m\].
     pub(super) fn step(&self) -> f64 {
         self.step
     }
@@ -174,8 +177,8 @@ mod tests {
     use super::*;
     use crate::scene::Scene;
 
-    /// Between its directions and variances, at three sensors: σ⁰ within 0.2 dB, 5 %, also where it is several times the
-    /// sea's.
+    /// Between its directions and variances, for three sensors, the table gives σ⁰ within 5 % (0.2 dB), also where it is several
+    /// times the sea's.
     #[test]
     fn the_table_is_the_change_between_its_nodes() {
         for (sensor, incidence) in [

@@ -19,7 +19,7 @@ fn ship(heading: f64, position: [f64; 2]) -> Ship {
     }
 }
 
-/// Waves seen as far as any image reaches, and no dark line.
+/// Waves visible as far as any image reaches, and no dark line.
 const ALL_WAVES: Extent = Extent {
     waves: 1e9,
     ..Extent::NOTHING
@@ -128,7 +128,7 @@ fn everything_lies_in_the_boxes(labels: &LabelledShip, heading: f64) {
     assert!((first[0] * sin - first[1] * cos).abs() < 1e-9);
 }
 
-/// The box of the wedge, against a search over all pixels.
+/// The box of the wedge agrees with a search over all pixels.
 #[test]
 fn boxes_hold_every_pixel_of_the_wedge() {
     let raster = Raster::image(90, 140, 10.0);
@@ -154,7 +154,7 @@ fn boxes_hold_every_pixel_of_the_wedge() {
         }
         assert!(any);
         let [x, y, width, height] = wake.box_px.unwrap();
-        // The box is that of the continuous wedge: it holds all pixels, and near the apex some more.
+        // The box bounds the continuous wedge: it holds all pixels, and near the apex some more.
         assert!(x <= low[0] + 1e-9 && y <= low[1] + 1e-9);
         assert!(x + width >= high[0] - 1e-9 && y + height >= high[1] - 1e-9);
         assert!(low[0] - x < 3.0 && low[1] - y < 3.0);
@@ -176,7 +176,7 @@ fn an_approaching_ship_is_seen_further_along_the_flight() {
     }
     let gone = labelled(&ship(270.0, [0.0, 0.0]), 1e5, &ALL_WAVES, &square()).ship;
     assert!(gone.echo_px.is_none() && gone.echo_box_px.is_none() && gone.position_px.is_some());
-    // An echo that is not drawn has no box: there is nothing in it.
+    // An echo that is not drawn has no box.
     let silent = Ship {
         echo: false,
         ..east
@@ -198,7 +198,7 @@ fn a_ship_outside_may_leave_its_wake_inside() {
     assert!(close([x, y], [0.0, 0.0]) && close([width, height], [200.0, 200.0]));
     // From the bow at 5100 m to the lower edge at −1000 m.
     assert!((away.wake.length_px - 610.0).abs() < 1e-9);
-    // Waves that are gone 4 km astern of the bow are gone before the image begins.
+    // Waves that end 4 km astern of the bow end before the image begins.
     let faded = Extent {
         waves: 4000.0,
         ..Extent::NOTHING
@@ -208,14 +208,14 @@ fn a_ship_outside_may_leave_its_wake_inside() {
         (faded.box_px, faded.centreline_px, faded.length_px),
         (None, Vec::new(), 0.0)
     );
-    // On the other side all has gone by.
+    // With the opposite heading, the wake lies away from the image.
     let ahead = labelled(&ship(180.0, [200.0, 5000.0]), 0.0, &ALL_WAVES, &square());
     assert_eq!((ahead.wake.box_px, ahead.wake.length_px), (None, 0.0));
     assert!(ahead.wake.arms_px.is_empty() && ahead.wake.centreline_px.is_empty());
 }
 
-/// Waves seen 600 m astern of the bow at row 90 end in row 150; the dark line, 20 m to either side, in row 180. Where
-/// only the line is seen the box holds it alone.
+/// Waves visible up to 600 m astern of the bow at row 90 end in row 150; the dark line, 20 m to either side, ends in row 180. If
+/// only the line is visible, the box holds it alone.
 #[test]
 fn boxes_end_where_the_wake_does() {
     let both = Extent {
@@ -264,7 +264,7 @@ fn nothing_is_labelled_where_nothing_is() {
     assert_eq!(labels_of(&scene).ships, []);
 }
 
-/// Objects are the labels of what is drawn, in the terms of a detector.
+/// Objects are the labels of visible wakes and drawn echoes.
 #[test]
 fn objects_are_the_visible_wakes_and_the_drawn_ships() {
     let extent = Extent {
@@ -359,7 +359,7 @@ fn json_has_the_stated_keys_and_empty_lists() {
     }
 }
 
-/// A ship of heading 0 in the middle that turns to starboard on 500 m, as on `track::tests`.
+/// A ship of heading 0 in the middle that turns to starboard with a given curvature, as in `track::tests`.
 fn turned(extent: &Extent, curvature: f64) -> WakeLabel {
     let wake = KelvinWake {
         hull: crate::hull::Hull::wigley(200.0, 30.0, 10.0),
@@ -372,7 +372,7 @@ fn turned(extent: &Extent, curvature: f64) -> WakeLabel {
     Frame::new([0.0; 2], 0.0, &square()).curved_wake(&wake, KELVIN_ANGLE, extent)
 }
 
-/// Half a circle of dark line, 20 m wide on both sides: a box around it, and a line along it.
+/// A half circle of dark line, 20 m to each side, has a box around it and a line along it.
 #[test]
 fn a_dark_line_on_a_turn_by_hand() {
     let half_circle = Extent {
@@ -382,8 +382,8 @@ fn a_dark_line_on_a_turn_by_hand() {
     };
     let wake = turned(&half_circle, 1.0 / 500.0);
     let [x, y, width, height] = wake.box_px.unwrap();
-    // A chord of a 24th of the half circle and the bow's 100 m stays R (1 − cos(0.07)) = 1.3 m inside, 0.13 pixels. From
-    // 2 pixels west of the ship to the eastern edge at 100 pixels east of it; 52 pixels to the south.
+    // A chord of a 24th of the half circle and the bow's 100 m stays R (1 − cos(0.07)) = 1.3 m, 0.13 pixels, inside. From 2
+    // pixels west of the ship to the eastern edge, 100 pixels east of it; 52 pixels to the south.
     assert!(
         (x - 98.0).abs() < 0.6 && (x + width - 200.0).abs() < 1e-9,
         "{x} {width}"
@@ -403,7 +403,7 @@ fn a_dark_line_on_a_turn_by_hand() {
     assert!((wake.length_px - 0.1 * half_circle.dark_line).abs() < 1e-9);
 }
 
-/// The arms on a turn: rays of the waves on them from where they were sent, by hand for two of them.
+/// The arms on a turn follow the rays of their waves from where they were sent, computed by hand for two of them.
 #[test]
 fn arms_on_a_turn_are_where_their_waves_have_come_to() {
     let extent = Extent {
@@ -420,7 +420,7 @@ fn arms_on_a_turn_are_where_their_waves_have_come_to() {
         let x = sent[0] - forward * sin - side * aside * cos;
         let y = sent[1] + forward * cos - side * aside * sin;
         let last = arm.last().unwrap();
-        // The steepest of 512 rays is within 1e-5 of the cusp's angle, its place within its square root of that along it.
+        // The steepest of 512 rays is within 1e-5 of the cusp's angle, its place along the arm within the square root of that.
         assert!(
             (last[0] - 100.0 - 0.1 * x).abs() < 0.3 && (last[1] - 100.0 + 0.1 * y).abs() < 0.3,
             "{last:?} {x} {y}"
@@ -429,7 +429,7 @@ fn arms_on_a_turn_are_where_their_waves_have_come_to() {
     assert_eq!(wake.arms_px.len(), 2);
 }
 
-/// On a wide turn the label is that of a straight track.
+/// On a wide turn, the label equals that of a straight track.
 #[test]
 fn a_wide_turn_has_the_label_of_a_straight_track() {
     let extent = Extent {
@@ -440,7 +440,7 @@ fn a_wide_turn_has_the_label_of_a_straight_track() {
     };
     let straight = labelled(&ship(0.0, [0.0, 0.0]), 0.0, &extent, &square()).wake;
     let wide = turned(&extent, 1e-7);
-    // 1050² m²/2R = 5.5 m at 10,000 km, less for what is nearer; arms as above.
+    // 1050² m²/2R = 0.055 m at 10,000 km, less for nearer places; arms as above.
     let pairs = [(wide.box_px, straight.box_px)];
     for (a, b) in pairs {
         for (a, b) in a.unwrap().into_iter().zip(b.unwrap()) {
@@ -454,7 +454,7 @@ fn a_wide_turn_has_the_label_of_a_straight_track() {
     assert!((wide.length_px - straight.length_px).abs() < 0.1);
 }
 
-/// A column of pixels is as wide as one of them: what crosses it has a length, and a box of that width.
+/// A column of pixels is one pixel wide: what crosses it has a length, and a box of that width.
 #[test]
 fn one_column_and_one_row_have_boxes() {
     let extent = Extent {

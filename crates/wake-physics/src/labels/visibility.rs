@@ -1,4 +1,4 @@
-//! How far a wake is seen, and how clearly: its expected contrast against sea and speckle, without an image.
+//! Visible extent of a wake, and its expected contrast against sea and speckle, without an image.
 
 use super::dark_line::{DarkLine, DarkNearby};
 use super::rows::rows_in;
@@ -18,45 +18,45 @@ use crate::window::sinc;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// Side of the windows in which a wake is looked for \[pixels\]: chosen.
+/// Side of the windows in which a wake is searched \[pixels\] (chosen).
 const WINDOW: usize = 16;
 
-/// A window shows the wake from this ratio on, of the root of the summed squares of what the wake changes over all independent
-/// pixels to the standard deviation of one: chosen; five deviations of a filter that knows the pattern, about ⅓ of one in each
-/// pixel where all are independent.
+/// Ratio from which a window shows the wake (chosen): root of the sum, over independent pixels, of the squared change by the
+/// wake, over the standard deviation of one pixel. Five standard deviations of a matched filter, about ⅓ of one in each pixel
+/// where all are independent.
 const THRESHOLD: f64 = 5.0;
 
-/// Rows of windows in which a part of a wake must be seen: chosen. A line of 16 pixels has no direction that can be measured.
+/// Rows of windows in which a part of a wake must be visible (chosen). A line of 16 pixels has no measurable direction.
 const LEAST_ROWS: usize = 2;
 
-/// Resolution ρ of a Gaussian exp(−(πy/ρ)²) over its width at half power: π/(2√ln 2).
+/// Ratio of the resolution ρ of a Gaussian exp(−(πy/ρ)²) to its width at half power: π/(2√ln 2).
 const OF_HALF_POWER: f64 = 1.886_718_667_752_793_6;
 
-/// Least standard deviation of a pixel that counts: the rounding of the fields.
+/// Smallest standard deviation of a pixel that counts: the rounding of the fields.
 const LEAST_NOISE: f64 = 1e-6;
 
 /// Visibility of a wake.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Visibility {
-    /// 10 log₁₀(1 + s), s the root of the mean square of the relative change of the intensity that the wake is expected
-    /// to make \[dB\]; 0 where nothing is to be seen.
+    /// 10 log₁₀(1 + s) \[dB\], where s is the root mean square of the relative change of the intensity expected from the wake; 0
+    /// where nothing is visible.
     pub contrast_db: f64,
-    /// s over the standard deviation of one pixel by sea and speckle \[1\].
+    /// s over the standard deviation of one pixel due to sea and speckle \[1\].
     pub snr: f64,
 }
 
-/// How far the parts of a wake are seen.
+/// Extent of the visible parts of a wake.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Extent {
-    /// Distance astern of the bow up to which waves are seen \[m\]; 0 where none is.
+    /// Distance astern of the bow up to which waves are visible \[m\]; 0 where none are.
     pub(super) waves: f64,
-    /// The same of the dark line.
+    /// Distance astern of the bow up to which the dark line is visible \[m\]; 0 where it is not.
     pub(super) dark_line: f64,
     /// Half-width of the dark line at its end \[m\].
     pub(super) half_width: f64,
-    /// How clearly, on average up to the longer end, or in all of the wedge if nothing is seen; `None` where the wedge
-    /// does not meet the image.
+    /// Visibility averaged up to the longer end, or over the whole wedge if nothing is visible; `None` where the wedge does not
+    /// meet the image.
     pub(super) visibility: Option<Visibility>,
 }
 
@@ -69,7 +69,7 @@ impl Extent {
         visibility: None,
     };
 
-    /// Distance astern of the bow up to which anything is seen \[m\].
+    /// Distance astern of the bow up to which anything is visible \[m\].
     pub(super) fn longest(&self) -> f64 {
         self.waves.max(self.dark_line)
     }
@@ -78,17 +78,17 @@ impl Extent {
 /// The waves of one ray as they are imaged.
 #[derive(Debug, Clone, Copy)]
 struct ImagedRay {
-    /// Distance off the track over the distance astern of midship, to port \[1\].
+    /// Distance off the track to port over the distance astern of midship \[1\].
     tangent: f64,
     /// Mean square of the relative change of the image, integrated across the ray \[m\].
     change: f64,
-    /// Mean square of the velocity toward the radar, likewise [m³/s²].
+    /// Mean square of the velocity toward the radar, integrated across the ray [m³/s²].
     velocity: f64,
     /// Squared azimuth phase by which a unit of velocity moves the wave, (ky R/V)² [s²/m²].
     displaced: f64,
 }
 
-/// The sea that a wake is seen against.
+/// The sea against which a wake is visible.
 #[derive(Debug)]
 pub(super) struct Background<'a> {
     models: &'a Models,
@@ -97,22 +97,22 @@ pub(super) struct Background<'a> {
     raster: Raster,
     /// Largest wavenumber that the computed pixels carry [rad/m].
     largest: f64,
-    /// Share of the intensity that waves change: the rest are breaking waves and the radar's noise.
+    /// Share of the intensity that waves change; the rest is breaking waves and the radar's noise.
     share: f64,
     /// Resolution in range where it is not the pixel \[m\].
     range_resolution: f64,
-    /// Side of the squares that the image is the mean over, where finer pixels are computed \[m\].
+    /// Side of the squares over which the image averages, where finer pixels are computed \[m\].
     square: f64,
     /// Azimuth resolution of the moving sea \[m\].
     resolution: f64,
     /// Standard deviation of one pixel over its mean.
     noise: f64,
-    /// Pixels that count as one, since the response correlates them, at least 1.
+    /// Number of pixels that count as one because the response correlates them, at least 1.
     correlated: f64,
     waves_drawn: bool,
     dark_line_drawn: bool,
     edges_drawn: bool,
-    /// What the waves change of the mean, if they are drawn on an impulse response.
+    /// Change of the mean by the waves, if they are drawn on an impulse response.
     short_waves: Option<ShortWaves>,
     /// Mean velocity toward the radar [m/s].
     pub(super) velocity: f64,
@@ -202,7 +202,7 @@ impl<'a> Background<'a> {
         self.transfer.at(k, omega).total().norm_sqr() * change * change
     }
 
-    /// How far a wake is seen that opens by `half_angle` \[rad\].
+    /// Visible extent of a wake that opens by `half_angle` \[rad\].
     pub(super) fn extent(&self, ship: usize, half_angle: f64) -> Extent {
         let step = WINDOW as f64 * self.raster.spacing;
         let edge = self.effects.bright_edge.edges[ship];
@@ -227,7 +227,7 @@ impl<'a> Background<'a> {
             let profile = short
                 .as_ref()
                 .map(|short| short.profile(wake, distance + half_length));
-            // Behind a ship that turns waves and dark line lie as beside a straight track along the tangent.
+            // Behind a turning ship, waves and dark line lie as beside a straight track along the tangent.
             let tangent = turns.then(|| {
                 let track = wake.track.at(-distance - half_length).straight();
                 let band = TurbulentWake { track, ..band.wake };
@@ -263,7 +263,7 @@ impl<'a> Background<'a> {
         let seen = extent.longest();
         let counted = rows.iter().filter(|(end, _)| seen == 0.0 || *end <= seen);
         let (sum, count) = counted.fold((0.0, 0.0), |(sum, count), (_, row)| {
-            // Where no wave is seen the box holds the dark line alone.
+            // If no wave is visible, the box holds the dark line alone.
             let of = if extent.waves > 0.0 || seen == 0.0 {
                 row.wedge
             } else {
@@ -293,7 +293,7 @@ impl<'a> Background<'a> {
         }
     }
 
-    /// The rays of the wake that are drawn, of both sides.
+    /// Rays of the drawn wake, on both sides.
     fn rays(&self, wake: &KelvinWake) -> Vec<ImagedRay> {
         if !self.waves_drawn {
             return Vec::new();
@@ -314,8 +314,8 @@ impl<'a> Background<'a> {
             .collect()
     }
 
-    /// The windows across the track at one distance astern of the stern that may be in the image: the first and the last, in
-    /// widths of a window off the track.
+    /// First and last of the windows across the track that may be in the image, at one distance astern of the stern, in window
+    /// widths off the track.
     fn windows(
         &self,
         wake: &KelvinWake,
@@ -335,7 +335,7 @@ impl<'a> Background<'a> {
         (first <= last).then_some([first, last])
     }
 
-    /// The windows of a row.
+    /// Changes in the windows of a row.
     fn row(
         &self,
         wake: &KelvinWake,
@@ -353,7 +353,7 @@ impl<'a> Background<'a> {
             let inside = (first..=last).contains(&place);
             inside.then_some((place - first) as usize)
         };
-        // The velocity at the places of a window, by which its waves displace themselves.
+        // Mean square velocity in each window, which displaces the waves there.
         let mut velocity = vec![0.0; windows];
         for ray in rays {
             if let Some(n) = place(ray) {
@@ -383,8 +383,8 @@ impl<'a> Background<'a> {
         row
     }
 
-    /// Smallest and largest distance off the track at which its perpendicular at a place of it may be in the image, with half
-    /// a window to spare \[m\]; `None` where all of the image lies ahead or astern of the place.
+    /// Smallest and largest distance off the track at which the perpendicular at a place of the track may be in the image, with
+    /// half a window to spare \[m\]; `None` where the whole image lies ahead or astern of the place.
     fn across(&self, there: &Track) -> Option<[f64; 2]> {
         let corners = there.straight().corners(&self.raster);
         let [astern, ahead] = span(corners.map(|corner| corner[0]));
@@ -403,7 +403,7 @@ impl<'a> Background<'a> {
         inside(column, self.raster.columns) && inside(row, self.raster.rows)
     }
 
-    /// Farthest that two places of the image lie apart, twice \[m\]: windows beyond are outside.
+    /// Twice the diagonal of the image \[m\]; windows farther away are outside.
     fn diagonal(&self) -> f64 {
         let [height, across] = [self.raster.rows, self.raster.columns].map(|n| n as f64);
         2.0 * height.hypot(across) * self.raster.spacing
@@ -417,14 +417,14 @@ fn span<const N: usize>(values: [f64; N]) -> [f64; 2] {
     values.into_iter().fold(start, wider)
 }
 
-/// What the displacement by its own velocity leaves of the power of a wave.
+/// Share of a wave's power that is left by displacement with its own velocity.
 ///
 /// ```text
 /// (2 J₁(C)/C)²,     C² = 2 (ky R/V)² ⟨u²⟩
 /// ```
 ///
-/// The echoes of a sinusoid displaced by (C/ky) sin have the fundamental 2J₁(C), to first order C; harmonics, which the
-/// smear of the sea weakens most, are left out.
+/// The echoes of a sinusoid displaced by (C/ky) sin have the fundamental 2J₁(C), to first order C. Harmonics are left out; the
+/// smear of the sea weakens them most.
 ///
 /// - `phase`: (ky R/V)² ⟨u²⟩ \[1\], at least 0
 fn bunched(phase: f64) -> f64 {
@@ -438,11 +438,11 @@ fn bunched(phase: f64) -> f64 {
 /// The windows of one row.
 #[derive(Debug, Clone, Copy, Default)]
 struct Row {
-    /// Largest mean square of the change by waves, and by the dark line.
+    /// Largest mean squared change by waves, and by the dark line.
     largest: [f64; 2],
     /// Sum of the mean squares, and number of windows, in the wedge.
     wedge: [f64; 2],
-    /// The same along the dark line.
+    /// Sum of the mean squares, and number of windows, along the dark line.
     line: [f64; 2],
 }
 
@@ -453,7 +453,7 @@ mod tests {
     use crate::track::Track;
     use std::f64::consts::TAU;
 
-    /// The rows of windows in which a place of the image may lie hold all of them, and are no more for a ship far away.
+    /// The rows of windows include every place of the image, and do not grow in number for a ship far away.
     #[test]
     fn rows_of_windows_do_not_grow_with_the_distance() {
         let raster = Raster::image(64, 48, 5.0);
@@ -491,7 +491,7 @@ mod tests {
         }
     }
 
-    /// The fundamental of displaced echoes by counting them: places y + (C/k) sin(ky) of even sources.
+    /// The fundamental of displaced echoes agrees with counting them, at places y + (C/k) sin(ky) of even sources.
     #[test]
     fn a_displaced_sinusoid_has_the_fundamental_of_its_echoes() {
         for c in [0.1f64, 0.5, 1.0, 2.0, 3.0] {

@@ -1,4 +1,4 @@
-//! What waves and effects change in the image, as roots of mean squares: every wave weighed with its modulation.
+//! Root mean square changes of the image by waves and effects, each wave weighted by its modulation.
 
 use super::FirstOrder;
 use super::waves::{WaveSample, rms};
@@ -9,14 +9,14 @@ use crate::waves::Quantity;
 use num_complex::Complex64;
 use std::f64::consts::{PI, SQRT_2};
 
-/// Points along each side of the image at which an effect that no wave carries is looked at.
+/// Points along each side of the image at which an effect that no wave carries is evaluated.
 const POINTS: usize = 48;
 
-/// A wave with what it does to the image.
+/// A wave with its modulation of the image.
 pub(crate) struct Weighed<'a> {
     wave: &'a WaveSample,
     modulation: Modulation,
-    /// Smear without the defocus of accelerated pixels: some pixels are not accelerated.
+    /// Smear without the defocus by acceleration: some pixels are not accelerated.
     sharpest: f64,
 }
 
@@ -26,7 +26,7 @@ impl AsRef<WaveSample> for Weighed<'_> {
     }
 }
 
-/// The waves of a scene, weighed once for all terms.
+/// The waves of a scene, weighted once for all terms.
 pub(crate) struct Amplitudes<'a> {
     pub(crate) first: &'a FirstOrder<'a>,
     /// Relative root mean square change of σ⁰ without tilt average, and without specular return.
@@ -72,7 +72,7 @@ impl<'a> Amplitudes<'a> {
         }
     }
 
-    /// What multiplies the intensity changes its mean and its contrast.
+    /// Factor from a relative change of the intensity to the change of its mean and contrast.
     pub(crate) fn with_contrast(&self) -> f64 {
         self.contrast.hypot(1.0)
     }
@@ -87,12 +87,12 @@ impl<'a> Amplitudes<'a> {
         self.width(self.first.resolution.at(0.0))
     }
 
-    /// A quantity of all waves, those of sea and wake independent.
+    /// Combines a quantity of sea and wake, which are independent.
     pub(crate) fn both(&self, of: impl Fn(&[Weighed<'_>]) -> f64) -> f64 {
         of(&self.sea).hypot(of(&self.wake))
     }
 
-    /// Modulation by waves as imaged, with the second order of the tilt and the shifts of all else.
+    /// Modulation by waves as imaged, with the second-order tilt and the displacement of all other contrast.
     pub(crate) fn waves(&self, waves: &[Weighed<'_>]) -> f64 {
         let variance = |axis: usize| -> f64 {
             let square = |w: &Weighed<'_>| w.wave.variance * w.wave.k[axis].powi(2);
@@ -104,8 +104,8 @@ impl<'a> Amplitudes<'a> {
         (linear(waves) + tilt) * self.with_contrast() + shift * self.contrast
     }
 
-    /// One effect of all waves, in the image: smeared in azimuth where it stands alone; where the image has
-    /// contrast of its own, their product is there too, at other wavenumbers and so not smeared alike.
+    /// Modulation of the image by one effect of all waves. Alone it is smeared in azimuth; its product with the image's own
+    /// contrast lies at other wavenumbers and is not smeared alike.
     pub(crate) fn part(&self, of: impl Fn(&Modulation) -> Complex64) -> f64 {
         let imaged = |waves: &[Weighed<'_>]| {
             let alone = rms(waves, |w| of(&w.modulation) * w.sharpest);
@@ -114,7 +114,7 @@ impl<'a> Amplitudes<'a> {
         self.both(imaged)
     }
 
-    /// The change of the smear of everything that is imaged.
+    /// Change of the azimuth smear of everything imaged.
     pub(crate) fn azimuth_smear(&self) -> f64 {
         let first = self.first;
         let transfer = &first.modulation.transfer;
@@ -137,7 +137,7 @@ impl<'a> Amplitudes<'a> {
         self.both(change) * self.with_contrast() + spots * self.backscatter[1]
     }
 
-    /// Displacements in azimuth over the width of what is displaced.
+    /// Displacements in azimuth over the width of the displaced features.
     pub(crate) fn azimuth_shift(&self, waves: &[Weighed<'_>]) -> f64 {
         let modulation = &self.first.modulation;
         let velocity = rms(waves, |w| {
@@ -146,7 +146,7 @@ impl<'a> Amplitudes<'a> {
         modulation.range_to_velocity * velocity / self.moving_width()
     }
 
-    /// Displacements in range over the width of what is displaced.
+    /// Displacements in range over the width of the displaced features.
     pub(crate) fn range_shift(&self, waves: &[Weighed<'_>]) -> f64 {
         let incidence = self.first.modulation.transfer.incidence;
         rms(waves, |_| Complex64::ONE) / (incidence.tan() * self.first.spacing)
@@ -158,7 +158,7 @@ fn linear(waves: &[Weighed<'_>]) -> f64 {
     rms(waves, |w| w.modulation.total() * w.sharpest)
 }
 
-/// Root of the mean square of a function of the place (x, y) over the image, looked at on a coarse raster.
+/// Root mean square over the image of a function of the position (x, y), evaluated on a coarse raster.
 pub(crate) fn rms_over(image: &Raster, of: impl Fn([f64; 2]) -> f64) -> f64 {
     let [rows, columns] = [image.rows.min(POINTS), image.columns.min(POINTS)];
     let mut sum = 0.0;

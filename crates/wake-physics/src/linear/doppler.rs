@@ -1,4 +1,4 @@
-//! How fast the sea seems to move toward the radar: the mean Doppler shift of its echo.
+//! Apparent velocity of the sea toward the radar: the mean Doppler shift of its echo.
 
 use super::waves;
 use crate::constants::SPEED_OF_LIGHT;
@@ -11,20 +11,20 @@ use crate::track::direction;
 use crate::turbulent::current::DRIFT_OF_WIND;
 use std::f64::consts::TAU;
 
-/// Mean velocity toward the radar of what it sees of the open sea, weighted with the echo [m/s].
+/// Mean velocity of the open sea toward the radar, weighted by the echo [m/s].
 ///
 /// ```text
 /// v = Σ ⟨ζ²⟩ Re(M T*) + (b c_B + 0.03 W) sin θ cos φ
 /// ```
 ///
-/// The sum is over all waves longer than the Bragg waves' split, M their modulation of σ⁰ by tilt and short waves, T the
-/// velocity toward the radar of a wave of unit height: crests that come nearer are brighter. b is the share of the Bragg
-/// return, `c_B` the phase speed of its waves, all of which run with the wind (chosen), W the wind speed with its drift of
-/// 3 % (chosen), φ the angle between the wind and the way to the radar.
+/// The sum runs over all waves longer than the split to the Bragg waves, M being their modulation of σ⁰ by tilt and short
+/// waves and T the velocity of a wave of unit height toward the radar: approaching crests are brighter. b is the share of
+/// the Bragg return, `c_B` the phase speed of its waves, all of which travel with the wind (chosen), W the wind speed with
+/// its drift of 3 % (chosen), φ the angle between the wind and the direction to the radar.
 ///
 /// # Validity
 ///
-/// First order in the slope. At C band, 35° and 5 to 10 m/s it is within 0.25 m/s of what is measured, see the test.
+/// First order in the slope. At C band, 35° and 5 to 10 m/s it agrees with measurements within 0.25 m/s (see the test).
 pub(super) fn mean_velocity(scene: &Scene, models: &Models, radar: &ModulationTransfer) -> f64 {
     let wave_induced: f64 = waves::sea(&models.sea, models.two_scale.split_wavenumber())
         .iter()
@@ -52,7 +52,7 @@ pub(super) fn mean_velocity(scene: &Scene, models: &Models, radar: &ModulationTr
 mod tests {
     use super::*;
 
-    /// Velocity by wind speed and direction at C band and 35°.
+    /// Velocity for a wind speed and direction at C band and 35°.
     fn velocity(polarization: &str, wind: f64, toward: f64) -> f64 {
         let scene = Scene::default()
             .with_assignments(&[
@@ -68,7 +68,8 @@ mod tests {
         crate::linear::OpenSea::new(&models).mean_velocity(&scene, &models)
     }
 
-    /// CDOP (Mouche et al., 2012, IEEE Trans. Geosci. Remote Sens. 50, 2901), a fit to measured Doppler shifts, evaluated.
+    /// Expected values evaluated from CDOP (Mouche et al., 2012, IEEE Trans. Geosci. Remote Sens. 50, 2901), a fit to
+    /// measured Doppler shifts.
     #[test]
     fn the_velocity_is_near_that_of_measured_doppler_shifts() {
         for (polarization, wind, toward, measured) in [

@@ -1,8 +1,8 @@
-//! First-order theory of a scene: what is known of its image before it is computed.
+//! First-order theory of a scene: statistics of its image before it is computed.
 //!
-//! A few thousand waves stand for sea and wakes ([`waves`], [`wake`]), transfer functions say how each modulates the image
-//! ([`modulation`](crate::scattering::modulation)), and [`amplitudes`] adds them up. By these figures the plan weighs terms and labels find what is visible; they
-//! never make the image of a scene.
+//! A few thousand waves represent sea and wakes ([`waves`], [`wake`]), transfer functions give each wave's modulation of
+//! the image ([`modulation`](crate::scattering::modulation)), and [`amplitudes`] sums them. The plan weighs terms by these
+//! figures, and labels use them to find what is visible; they never enter the image.
 
 pub(crate) mod amplitudes;
 mod doppler;
@@ -23,10 +23,10 @@ use open_sea::slopes;
 use std::f64::consts::{PI, SQRT_2};
 use waves::rms;
 
-/// Standard deviations that the margin holds; beyond lie 7 in a million.
+/// Margin in standard deviations of the displacement; 7 in a million lie beyond.
 const DEVIATIONS: f64 = 4.5;
 
-/// Mean square of the wake where it is over that in the whole image: the wedge covers about a quarter of it.
+/// Ratio of the wake's mean square inside its wedge to that over the image: the wedge covers about a quarter of it.
 const WEDGE: f64 = 4.0;
 
 /// First-order theory of a scene: its open sea and the waves of its ships.
@@ -38,13 +38,13 @@ pub(crate) struct FirstOrder<'a> {
     pub(crate) wake: Vec<WaveSample>,
     /// Modulation of the image by waves.
     pub(crate) modulation: ModulationTransfer,
-    /// Azimuth resolution of the sea in motion.
+    /// Azimuth resolution of the moving sea.
     pub(crate) resolution: AzimuthResolution,
     /// Mean σ⁰ over the image: Bragg and specular.
     pub(crate) mean: [f64; 2],
-    /// Slopes of the resolved waves where the wake is.
+    /// Slopes of the resolved waves inside the wake.
     pub(crate) resolved: SlopeCovariance,
-    /// Variance of the hydrodynamic modulation by the waves of the sea that pixels carry and that modulate \[1\].
+    /// Variance of the hydrodynamic modulation by waves of the sea that pixels resolve and that modulate \[1\].
     pub(crate) modulation_variance: f64,
     /// Size of a computed pixel \[m\].
     pub(crate) spacing: f64,
@@ -60,7 +60,7 @@ impl<'a> FirstOrder<'a> {
             wake_slopes[1] = wake_slopes[1].plus(&over_image.times(crowding));
             wake.extend(waves);
         }
-        // Where the wake is, terms matter most; the mean is that of the whole image.
+        // Terms matter most inside the wake; the mean is taken over the whole image.
         let [mean_slopes, resolved] = wake_slopes.map(|wake| open.slopes.plus(&wake));
         let mean = match wake.is_empty() {
             true => open.mean(),
@@ -83,7 +83,7 @@ impl<'a> FirstOrder<'a> {
         self.mean[0] + self.mean[1]
     }
 
-    /// A cross-section that is added to the image over the mean σ⁰; 1 where nothing scatters.
+    /// Ratio to the mean σ⁰ of a cross-section that is added to the image; 1 where nothing scatters.
     pub(crate) fn over_mean(&self, sigma0: f64) -> f64 {
         over_mean(sigma0, self.mean)
     }
@@ -93,8 +93,8 @@ impl<'a> FirstOrder<'a> {
         self.open.waves.is_empty() && self.wake.is_empty()
     }
 
-    /// Margin in rows and columns. It depends on the scene alone, not on the terms that are used: the same seed
-    /// draws the same sea whatever is left out.
+    /// Margin in rows and columns. It depends on the scene alone, not on the terms used, so that a seed always draws the
+    /// same sea.
     pub(crate) fn margin(&self, models: &Models) -> [usize; 2] {
         if self.is_flat() {
             return [0, 0];
@@ -109,19 +109,19 @@ impl<'a> FirstOrder<'a> {
             .map(|d| (DEVIATIONS * d / models.pixels.computed.spacing).ceil() as usize + 1)
     }
 
-    /// Standard deviation of the acceleration toward the radar, where the wake is [m/s²].
+    /// Standard deviation of the acceleration toward the radar inside the wake [m/s²].
     pub(crate) fn acceleration(&self) -> f64 {
         let transfer = &self.modulation.transfer;
         self.deviation(|w| transfer.factor(Quantity::RadialAcceleration, w.k, w.omega))
     }
 
-    /// Standard deviation of a linear field, where the wake is.
+    /// Standard deviation of a linear field inside the wake.
     fn deviation(&self, factor: impl Fn(&WaveSample) -> num_complex::Complex64) -> f64 {
         rms(&self.open.waves, &factor).hypot(WEDGE.sqrt() * rms(&self.wake, &factor))
     }
 }
 
-/// Variance of the hydrodynamic modulation by the waves of the sea that pixels carry and that modulate \[1\].
+/// Variance of the hydrodynamic modulation by waves of the sea that pixels resolve and that modulate \[1\].
 fn modulation_variance(models: &Models) -> f64 {
     let band = models
         .pixels

@@ -1,4 +1,4 @@
-//! The open sea of a scene: its waves, its mean σ⁰ and how waves modulate it, without ships.
+//! The open sea of a scene without ships: its waves, its mean σ⁰ and their modulation.
 
 use super::waves::{WaveSample, rms};
 use super::{doppler, waves};
@@ -9,10 +9,10 @@ use crate::scene::Scene;
 use crate::waves::Transfer;
 use std::sync::OnceLock;
 
-/// Step of the differences that give the slope of ln σ⁰ \[1\].
+/// Step of the finite differences for the slope of ln σ⁰ \[1\].
 pub(super) const SLOPE_STEP: f64 = 0.05;
 
-/// First-order theory of the sea of a scene without its ships.
+/// First-order theory of a scene's sea without ships.
 #[derive(Debug)]
 pub(crate) struct OpenSea {
     /// Resolved waves, swell included.
@@ -21,9 +21,9 @@ pub(crate) struct OpenSea {
     pub(crate) swell: Vec<WaveSample>,
     /// Slopes of the resolved waves.
     pub(crate) slopes: SlopeCovariance,
-    /// σ⁰ of facets with the average over subpixel slopes and the specular return.
+    /// σ⁰ of facets with tilt average over subpixel slopes and specular return.
     pub(crate) backscatter: Backscatter,
-    /// Mean σ⁰: Bragg and specular; computed where a scene needs it.
+    /// Mean σ⁰, Bragg and specular; computed on demand.
     mean: OnceLock<[f64; 2]>,
     transfer: Transfer,
     /// First derivatives of ln σ⁰ by the slopes.
@@ -35,7 +35,7 @@ pub(crate) struct OpenSea {
 
 impl OpenSea {
     pub(crate) fn new(models: &Models) -> Self {
-        // Half a cell of the sea's lattice more than the band: cells at its edge hold waves from beyond.
+        // Half a cell of the sea's lattice beyond the band: cells at its edge hold waves from beyond.
         let half_cell = 1.0
             / models
                 .pixels
@@ -62,7 +62,7 @@ impl OpenSea {
         }
     }
 
-    /// Whether the sea has no wind wave that a pixel carries.
+    /// Whether pixels resolve no wind wave.
     pub(crate) fn no_wind_waves(&self) -> bool {
         self.waves.len() == self.swell.len()
     }
@@ -78,7 +78,7 @@ impl OpenSea {
         self.modulation_of_mean(self.mean())
     }
 
-    /// Modulation of an intensity of this mean σ⁰, Bragg and specular.
+    /// Modulation of an intensity with the given mean σ⁰, Bragg and specular.
     pub(super) fn modulation_of_mean(&self, mean: [f64; 2]) -> ModulationTransfer {
         ModulationTransfer {
             transfer: self.transfer,
@@ -101,20 +101,20 @@ impl OpenSea {
 
     /// Share of the mean intensity that waves modulate \[1\].
     ///
-    /// - `added`: σ⁰ that no wave modulates
+    /// - `added`: components of σ⁰ that no wave modulates
     pub(crate) fn modulated_share(&self, added: &[f64]) -> f64 {
         let share = added.iter().map(|&sigma0| over_mean(sigma0, self.mean()));
         1.0 / share.fold(1.0, |sum, share| sum + share)
     }
 
-    /// Models that average over the resolved waves, too: for the mean over all seas.
+    /// Models that also average over the resolved waves, for the mean over all seas.
     pub(crate) fn averaged(&self, models: &Models) -> Models {
         let mut models = models.clone();
         models.average_over(&self.slopes, self.velocity());
         models
     }
 
-    /// The modulation where models may average over more waves.
+    /// Modulation for models that may average over more waves.
     pub(crate) fn modulation_of(&self, models: &Models) -> ModulationTransfer {
         ModulationTransfer {
             tilt: slope_of_ln_sigma(&models.backscatter(true, true)).0,
@@ -136,7 +136,7 @@ fn bragg_share(mean: [f64; 2]) -> f64 {
     if total > 0.0 { mean[0] / total } else { 0.0 }
 }
 
-/// What is added to a mean σ⁰, Bragg and specular, over it; 1 where nothing scatters and all that is added is all there is.
+/// Ratio of an added cross-section to a mean σ⁰, Bragg and specular; 1 where only the added one scatters.
 pub(crate) fn over_mean(value: f64, mean: [f64; 2]) -> f64 {
     let total = mean[0] + mean[1];
     match value {

@@ -1,4 +1,4 @@
-//! A few thousand waves that stand for the wake of a ship in an image.
+//! A few thousand waves that represent a ship's wake in an image.
 
 use super::waves;
 use super::waves::WaveSample;
@@ -7,13 +7,13 @@ use crate::raster::Raster;
 use crate::track::Track;
 use std::f64::consts::PI;
 
-/// Tolerance of the coarse wake that is only weighed.
+/// Tolerance of the coarse wake used for these estimates.
 const COARSE: f64 = 0.1;
 
-/// Headings that stand for all of a ship that turns: chosen.
+/// Number of headings that represent a turning ship: chosen.
 const HEADINGS: usize = 8;
 
-/// The waves of the wake in the image, and how much stronger they are within a ship's length of the stern.
+/// The waves of the wake in the image, and the ratio of their variance within a ship's length of the stern to the mean.
 pub(super) fn sampled(wake: &KelvinWake, image: &Raster) -> (Vec<WaveSample>, f64) {
     match wake.track.turn() {
         None => sampled_straight(wake, image),
@@ -21,8 +21,8 @@ pub(super) fn sampled(wake: &KelvinWake, image: &Raster) -> (Vec<WaveSample>, f6
     }
 }
 
-/// The same behind a ship that turns: the mean over ships that go straight on, on all headings that it has had, and are as
-/// far ahead of the middle of the image as it is from it.
+/// As [`sampled`], for a turning ship: the mean over ships on straight courses, with the headings that it has had, each as
+/// far ahead of the image's centre as the ship is from it.
 fn sampled_turn(wake: &KelvinWake, radius: f64, image: &Raster) -> (Vec<WaveSample>, f64) {
     if wake.plan(image, COARSE).nodes() == 0 {
         return (Vec::new(), 1.0);
@@ -64,8 +64,8 @@ fn sampled_straight(wake: &KelvinWake, image: &Raster) -> (Vec<WaveSample>, f64)
     let track_length = farthest
         .min(height.hypot(across))
         .min(farthest - nearest.min(0.0));
-    // The wedge is 0.71 of the distance wide, counted from half a length astern of midship: the energy across the
-    // track stands on this width, also where the image is narrower.
+    // The wedge is 0.71 of the distance wide, counted from half a length astern of midship. The energy across the track is
+    // spread over this width, even where the image is narrower.
     let wedge = track_length * 0.71 * (0.5 * length).max(nearest);
     let area = (height * across).max(wedge);
     let waves = waves::wake(&nodes, wake.track.forward, track_length, area);

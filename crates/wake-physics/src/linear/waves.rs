@@ -1,4 +1,4 @@
-//! A few thousand waves that stand for the resolved sea and wake.
+//! A few thousand waves that represent the resolved sea and wake.
 
 use crate::dispersion::angular_frequency;
 use crate::swell::Swell;
@@ -7,7 +7,7 @@ use crate::wind_sea::DirectionalSpectrum;
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 
-/// One wave, or a bin of waves, with the variance it brings to the elevation in the image.
+/// One wave, or a bin of waves, with its contribution to the variance of the elevation in the image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct WaveSample {
     /// Wavenumber (kx, ky) [rad/m].
@@ -24,7 +24,7 @@ impl AsRef<Self> for WaveSample {
     }
 }
 
-/// Steps in ln k and in direction of the polar grid of the sea.
+/// Steps of the sea's polar grid in ln k and in direction.
 const STEPS: [usize; 2] = [64, 36];
 
 /// Longest waves sampled, as a fraction of the peak wavenumber: exp(−(5/4)·5²) of the spectrum lies below.
@@ -60,7 +60,7 @@ pub(crate) fn sea(spectrum: &DirectionalSpectrum, band: f64) -> Vec<WaveSample> 
     waves
 }
 
-/// The swell, one wave in the middle of each of its cells.
+/// The swell, as one wave in the middle of each of its cells.
 pub(crate) fn swell(swell: Option<&Swell>, depth: f64, band: f64) -> Vec<WaveSample> {
     let cells = swell.map_or_else(Vec::new, |swell| swell.cells(band, || 0.5));
     let sample = |(k, variance): ([f64; 2], f64)| WaveSample {
@@ -71,7 +71,7 @@ pub(crate) fn swell(swell: Option<&Swell>, depth: f64, band: f64) -> Vec<WaveSam
     cells.into_iter().map(sample).collect()
 }
 
-/// The wake, each node with its share of the mean square over an image.
+/// The wake, each node with its contribution to the mean square over an image.
 ///
 /// Across the track, at any distance astern, ∫ζ² dy' = π∫|A|²/(dky'/dθ) dθ (Parseval; y' across the track, A the
 /// amplitude per θ). Nodes aₙ = A dθ in order along the curve have spacing Δky': the mean square over an area is
@@ -93,7 +93,7 @@ pub(crate) fn wake(
             let (before, after) = (n.saturating_sub(1), (n + 1).min(count - 1));
             let spacing = (across(after) - across(before)).abs() / (after - before) as f64;
             let square = nodes.amplitude[n].norm_sqr();
-            // Wavenumbers that underflow, as far astern in shallow water, coincide at 0 and carry nothing.
+            // Wavenumbers that underflow, as they do far astern in shallow water, coincide at 0 and carry no energy.
             let variance = if square > 0.0 && spacing > 0.0 {
                 PI * square / spacing * track_length / area
             } else {
@@ -108,7 +108,7 @@ pub(crate) fn wake(
         .collect()
 }
 
-/// Root of the mean square of a linear quantity over independent waves.
+/// Root mean square of a linear quantity over independent waves.
 pub(crate) fn rms<W: AsRef<WaveSample>>(waves: &[W], factor: impl Fn(&W) -> Complex64) -> f64 {
     waves
         .iter()
@@ -126,7 +126,7 @@ mod tests {
     use crate::wind_sea::WindSea;
     use num_complex::Complex64;
 
-    /// The bins have the variances of the band.
+    /// The variances of the bins sum to those of the band.
     #[test]
     fn the_sea_sample_has_the_variances_of_the_band() {
         for (wind_speed, band) in [(3.0, 1.2), (5.0, 1.2), (12.0, 0.6)] {
@@ -142,7 +142,7 @@ mod tests {
             let waves = sea(&spectrum, band);
             let elevation: f64 = waves.iter().map(|w| w.variance).sum();
             let slope: f64 = waves.iter().map(|w| w.variance * w.k[0] * w.k[0]).sum();
-            // Midpoint rule, 0.05 wide in ln k across a peak 0.2 wide: below a percent.
+            // Midpoint rule with steps of 0.05 in ln k across a peak 0.2 wide: error below one percent.
             assert!(
                 (elevation / exact.elevation - 1.0).abs() < 0.01,
                 "{wind_speed}"
@@ -151,7 +151,7 @@ mod tests {
         }
     }
 
-    /// Waves of a smooth curve, summed across the track, against Parseval.
+    /// Waves of a smooth curve, summed across the track, against Parseval's theorem.
     #[test]
     fn the_wake_sample_has_the_mean_square_across_the_track() {
         let mut nodes = PlaneWaves::default();
@@ -163,7 +163,7 @@ mod tests {
         }
         let waves = wake(&nodes, [1.0, 0.0], 1.0, 1.0);
         let sum: f64 = waves.iter().map(|w| w.variance).sum();
-        // ∫ζ²dy by pixels, averaged over the phase along the track (two places a quarter wave apart).
+        // ∫ζ²dy by pixels, averaged over the phase along the track (two positions a quarter wave apart).
         let transfer = Transfer {
             depth: f64::INFINITY,
             incidence: 0.5,

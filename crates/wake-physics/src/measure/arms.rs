@@ -1,4 +1,4 @@
-//! The heading from the wake's arms: a Radon transform along the half-lines that start at the bow.
+//! Heading from the wake's arms, by a Radon transform along half-lines that start at the bow.
 
 use super::smooth::smooth;
 use super::stationary::FASTEST;
@@ -7,36 +7,36 @@ use crate::kelvin::{KELVIN_ANGLE, half_angle};
 use crate::raster::{Field, Raster};
 use crate::sar::geometry::direction;
 
-/// Half-lines of the transform, one a degree.
+/// Number of half-lines of the transform, one per degree.
 const RAYS: i64 = 360;
-/// Half-width of the wedge: the Kelvin angle of 19.5° and what the bunching adds \[deg\].
+/// Half-width of the wedge: the Kelvin angle of 19.5° and the widening by velocity bunching \[deg\].
 const HALF_WEDGE: i64 = 23;
-/// Opening of the arms beyond the Kelvin angle up to which the wedge holds them \[deg\].
+/// Largest opening of the arms beyond the Kelvin angle that the wedge covers \[deg\].
 const LARGEST_EXCESS: f64 = 2.0;
-/// Width of the sea beside the wedge that it is compared with \[deg\].
+/// Width of the sea on each side of the wedge that is compared with it \[deg\].
 const BESIDE: i64 = 25;
 /// Width of an arm \[deg\].
 const ARM: i64 = 7;
-/// Between inside and outside \[deg\].
+/// Gap between inside and outside \[deg\].
 const GAP: i64 = 2;
-/// Part of a half-line that counts, in halves of the image's smaller side.
+/// Part of a half-line that counts, in units of half the image's smaller side.
 const REACH: [f64; 2] = [0.31, 1.17];
-/// Brightest that an arm counts, so that one bright arm does not outweigh two; between sea (0) and brightest (1).
+/// Cap on the brightness of an arm, between sea (0) and brightest (1), so that one bright arm does not outweigh two.
 const CAP: f64 = 0.7;
-/// Standard deviation of the average of energy \[m\], and of what counts as slow change \[m\].
+/// Standard deviations of the smoothing of the energy \[m\], and of the slow change that is removed \[m\].
 const SMOOTHING: [f64; 2] = [12.0, 200.0];
-/// Contrast between wedge and sea, in standard deviations of the sea, from which there is a wake.
+/// Contrast between wedge and sea from which a wake is measurable, in standard deviations of the sea.
 const THRESHOLD: f64 = 3.0;
 
-/// Where the wake opens, seen from `position`; the heading is the opposite.
+/// Heading of the ship, opposite to the sector in which its wake opens.
 ///
 /// ```text
 /// R(φ) = ⟨ln ⟨(I_dB − ⟨I_dB⟩)²⟩⟩ along the half-line φ from the bow
 /// ```
 ///
-/// The sector of two Kelvin angles whose edges rise most above the sea beside them is the wake. Nothing is measurable
-/// where the fastest ship would open a wider one: of a wide wake the radar often shows one arm alone, and one arm of
-/// unknown opening has no heading.
+/// The wake is the sector of two Kelvin angles whose edges rise most above the sea beside them. Nothing is measurable where the
+/// fastest ship would open a wider sector: of a wide wake the radar often shows only one arm, and one arm of unknown opening
+/// gives no heading.
 pub(super) fn heading(decibel: &Field, raster: &Raster, ship: &ShipPlace) -> Measured {
     if half_angle(FASTEST, ship.depth) > KELVIN_ANGLE + LARGEST_EXCESS.to_radians() {
         return Measured::NOTHING;
@@ -44,7 +44,7 @@ pub(super) fn heading(decibel: &Field, raster: &Raster, ship: &ShipPlace) -> Mea
     let energy = log_energy(decibel, raster.spacing);
     let mut apex = ship.position;
     let mut found = None;
-    // The arms start at the bow, which lies half a ship ahead on a heading found from midship first.
+    // The arms start at the bow, half a ship ahead of midship on a heading that is first found from midship.
     for _ in 0..3 {
         let Some(astern) = wedge(&rays(&energy, raster, apex)) else {
             return Measured::NOTHING;
@@ -59,7 +59,7 @@ pub(super) fn heading(decibel: &Field, raster: &Raster, ship: &ShipPlace) -> Mea
     })
 }
 
-/// Logarithm of the local energy of what changes fast.
+/// Logarithm of the local energy of fast changes.
 fn log_energy(decibel: &Field, spacing: f64) -> Field {
     let slow = smooth(decibel, SMOOTHING[1] / spacing);
     let mut square = decibel.clone();
@@ -73,7 +73,7 @@ fn log_energy(decibel: &Field, spacing: f64) -> Field {
     energy
 }
 
-/// Mean along the half-lines from a point, one a degree clockwise from +y; `None` where one misses the image.
+/// Means along the half-lines from a point, one per degree clockwise from +y; `None` where one misses the image.
 fn rays(field: &Field, raster: &Raster, from: [f64; 2]) -> Option<Vec<f64>> {
     let half = 0.5 * raster.rows.min(raster.columns) as f64 * raster.spacing;
     let steps = |reach: f64| (reach * half / raster.spacing) as usize;
@@ -126,7 +126,7 @@ fn wedge(profile: &Option<Vec<f64>>) -> Option<(i64, f64)> {
     Some((best, contrast(profile, best)))
 }
 
-/// Mean of the wedge above the mean of all beyond its neighbourhood, in standard deviations of the latter.
+/// Mean of the wedge above the mean of all beyond twice its half-width, in standard deviations of the latter.
 fn contrast(profile: &[f64], middle: i64) -> f64 {
     let values = |from: i64, to: i64| {
         (from..=to).map(move |d| profile[(middle + d).rem_euclid(RAYS) as usize])

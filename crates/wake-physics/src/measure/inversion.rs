@@ -1,8 +1,7 @@
-//! Wind and incidence from the brightness of the open sea, fetch from its contrast.
+//! Wind and incidence from the brightness of the open sea, and fetch from its contrast.
 //!
-//! One brightness cannot tell three unknowns apart. Each is therefore found with the other two given, as the prompt of
-//! a generated image or the scene of a simulated one states them: the question is whether the image is as bright as
-//! *this* wind at *this* incidence makes the sea.
+//! One brightness cannot determine three unknowns. Each is therefore found with the other two given, as stated by the prompt of a
+//! generated image or the scene of a simulated image: is the image as bright as the sea under *this* wind at *this* incidence?
 
 use super::{Measured, OpenSea};
 use crate::models::Models;
@@ -11,7 +10,7 @@ use crate::scattering::SlopeCovariance;
 use crate::scene::Scene;
 use crate::simulate::LinearSea;
 
-/// Winds tried [m/s]: first, step, number.
+/// Wind speeds tried [m/s].
 const WINDS: Lattice = Lattice(2.0, 0.5, 21);
 /// Incidences tried \[deg\].
 const INCIDENCES: Lattice = Lattice(10.0, 1.0, 36);
@@ -19,16 +18,17 @@ const INCIDENCES: Lattice = Lattice(10.0, 1.0, 36);
 const ANGLES: Lattice = Lattice(0.0, 5.0, 19);
 /// Logarithms of the fetches tried \[m\]: 3 to 240 km.
 const FETCHES: Lattice = Lattice(8.0, 0.4, 12);
-/// Least change of brightness with the value, [dB per m/s], [dB per degree], and between wind along and across the look
-/// direction \[dB\]: below it, the value is not measurable.
+/// Smallest change of brightness for which a value is measurable: with wind speed [dB per m/s], with incidence [dB per degree],
+/// and between wind along and across the look direction \[dB\].
 const THRESHOLDS: [f64; 3] = [0.5, 0.15, 1.5];
-/// Least relative change of the variance of intensity with that of the fetch \[1\], likewise.
+/// Smallest relative change of the variance of intensity per relative change of the fetch for which the fetch is measurable
+/// \[1\].
 const LEAST_GROWTH: f64 = 0.3;
 /// Pixels along a side of the sea whose variance is computed.
 const SIDE: usize = 128;
-/// How far outside the range of brightnesses the sea may be and still count as its end \[dB\].
+/// Distance outside the range of brightnesses within which the sea still counts as its end \[dB\].
 const TOLERANCE: f64 = 0.25;
-/// Least skew of the spectrum that tells one diagonal from the other \[1\].
+/// Smallest skew of the spectrum that distinguishes one diagonal from the other \[1\].
 const LEAST_SKEW: f64 = 0.03;
 
 /// First value, step, number of values.
@@ -69,7 +69,7 @@ fn brightness(scene: &Scene) -> f64 {
     bragg + specular
 }
 
-/// Wind speed [m/s] that makes the sea of `scene` as bright as the image, its direction, fetch and incidence given.
+/// Wind speed [m/s] that makes the sea of `scene` as bright as the image, for given direction, fetch and incidence.
 ///
 /// - confidence: change of brightness [dB per m/s]; 0 if no wind of 2 to 12 m/s fits, or more than one
 ///
@@ -83,7 +83,7 @@ pub fn wind_speed(sea: &OpenSea, scene: &Scene) -> crate::Result<Measured> {
     .map(|(value, slope)| Measured::with_threshold(value, slope, THRESHOLDS[0]))
 }
 
-/// Incidence \[deg\] at which the sea of `scene` is as bright as the image, its wind given.
+/// Incidence \[deg\] at which the sea of `scene` is as bright as the image, for a given wind.
 ///
 /// - confidence: change of brightness [dB per degree]; 0 if no incidence of 10 to 45° fits, or more than one
 ///
@@ -97,18 +97,19 @@ pub fn incidence(sea: &OpenSea, scene: &Scene) -> crate::Result<Measured> {
     .map(|(value, slope)| Measured::with_threshold(value, slope, THRESHOLDS[1]))
 }
 
-/// Fetch \[m\] whose waves give the sea of `scene` the contrast of the image, its wind and incidence given.
+/// Fetch \[m\] whose waves give the sea of `scene` the contrast of the image, for given wind and incidence.
 ///
 /// ```text
 /// contrast² = ∬ P(k; fetch) dk,    P the quasi-linear spectrum of the intensity
 /// ```
 ///
 /// - `contrast`: standard deviation over mean of the intensity before speckle \[1\], see [`OpenSea::contrast`]
-/// - confidence: relative change of the variance with that of the fetch; 0 if no fetch of 3 to 240 km fits, or more than one
+/// - confidence: relative change of the variance per relative change of the fetch; 0 if no fetch of 3 to 240 km fits, or more
+///   than one
 ///
 /// # Errors
 ///
-/// As [`LinearSea::new`].
+/// As in [`LinearSea::new`].
 pub fn fetch(contrast: f64, scene: &Scene) -> crate::Result<Measured> {
     let mut scene = scene.clone();
     (scene.grid.rows, scene.grid.columns) = (SIDE, SIDE);
@@ -123,14 +124,14 @@ pub fn fetch(contrast: f64, scene: &Scene) -> crate::Result<Measured> {
     })
 }
 
-/// Axis of the wind [deg clockwise from azimuth, 0 up to 180], wind speed, fetch and incidence given.
+/// Axis of the wind [deg clockwise from azimuth, 0 up to 180], for given wind speed, fetch and incidence.
 ///
-/// Short waves and slopes are the same for a wind and its opposite, and brightness depends on the angle to the look
-/// direction alone; which of the two diagonals it is comes from the skew of the spectrum. So the measurement has an
-/// ambiguity of 180°, by nature.
+/// Short waves and slopes are the same for a wind and its opposite, and brightness depends only on the angle to the look
+/// direction. The skew of the spectrum selects one of the two diagonals. The measurement therefore has an inherent ambiguity of
+/// 180°.
 ///
-/// - confidence: difference of brightness between wind along and across the look direction \[dB\]; 0 if the sea is
-///   brighter or darker than either, or neither diagonal stands out where it must
+/// - confidence: difference of brightness between wind along and across the look direction \[dB\]; 0 if the sea is brighter or
+///   darker than either, or if the diagonals cannot be distinguished
 ///
 /// # Errors
 ///
@@ -187,7 +188,7 @@ fn curve(scene: &Scene, lattice: &Lattice, set: impl Fn(&mut Scene, f64)) -> Vec
         .collect()
 }
 
-/// Values at which a curve crosses a level, by linear interpolation, each with the slope's size.
+/// Values at which a curve crosses a level, by linear interpolation, each with the absolute slope.
 fn crossings(curve: &[(f64, f64)], level: f64) -> Vec<(f64, f64)> {
     curve
         .windows(2)

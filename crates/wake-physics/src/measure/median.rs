@@ -1,6 +1,6 @@
-//! The middle of many values.
+//! Median of values.
 
-/// The middle value, the upper of the two of an even number; 0 of none.
+/// Median, for an even number of values the upper of the two in the middle; 0 without values.
 #[must_use]
 pub fn median(values: &[f32]) -> f32 {
     let mut sorted = values.to_vec();

@@ -1,8 +1,7 @@
 //! Heading and speed of the ship, wind, fetch and incidence, measured in one image.
 //!
-//! The measurements evaluate simulated and generated images by physics instead of by pixels. Each takes one image of
-//! intensity before speckle and returns a value with a confidence; a quantity that the image does not show is not
-//! measurable.
+//! The measurements evaluate simulated and generated images by physics instead of by pixels. Each takes an image of intensity
+//! before speckle and returns a value with a confidence; a quantity that the image does not show is not measurable.
 //!
 //! ```text
 //! image ─► wake arms ─► heading ─► stationary waves ─► heading, speed
@@ -10,9 +9,9 @@
 //!                └──► contrast ─► fetch
 //! ```
 //!
-//! Physics gives the curves and the brightness. Windows, bands and the thresholds of confidence have no closed
-//! form: they were chosen on 300 simulated scenes of the paper's ranges (ship 195 m, 256 × 256 pixels of 4 m, X
-//! band, R/V 78 s) that are not among those of the `evaluate` example, which reports how good the result is.
+//! Curves and brightness follow from physics. Windows, bands and confidence thresholds have no closed form: they were chosen on
+//! 300 simulated scenes of the paper's ranges (ship 195 m, 256 × 256 pixels of 4 m, X band, R/V 78 s) that are not among the
+//! scenes of the `evaluate` example, which reports the accuracy.
 
 mod arms;
 mod inversion;
@@ -46,11 +45,11 @@ pub struct ShipPlace {
     pub position: [f64; 2],
     /// Length \[m\]: the arms start at the bow.
     pub length: f64,
-    /// Depth of the water \[m\], may be infinite: with the speed it sets how far the arms open.
+    /// Depth of the water \[m\], may be infinite: with the speed it sets the opening of the arms.
     pub depth: f64,
 }
 
-/// A measured value, and whether to believe it.
+/// A measured value and its confidence.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Measured {
     /// The value, in the unit of its measurement; NaN where there is none.
@@ -62,14 +61,14 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// Nothing to measure.
+    /// Result where nothing is measurable.
     pub(crate) const NOTHING: Self = Self {
         value: f64::NAN,
         confidence: 0.0,
         measurable: false,
     };
 
-    /// A value that is believed from a confidence of `threshold` on.
+    /// A value that is measurable if its confidence is at least `threshold`.
     pub(crate) fn with_threshold(value: f64, confidence: f64, threshold: f64) -> Self {
         if !(value.is_finite() && confidence.is_finite()) {
             return Self::NOTHING;

@@ -13,27 +13,27 @@ pub struct OpenSea {
     pub mean: f64,
     /// Standard deviation over mean \[1\].
     pub contrast: f64,
-    /// Power of the waves that run from lower left to upper right less that of the others, over their sum: positive
-    /// for a wind along 45° or 225°.
+    /// Power of the waves that run from lower left to upper right minus the power of the others, over their sum; positive for a
+    /// wind along 45° or 225°.
     pub skew: f64,
 }
 
-/// Half-angle astern that is left out, with the wake and its displaced echoes \[deg\].
+/// Half-angle of the masked sector astern, which holds the wake and its displaced echoes \[deg\].
 const LEFT_OUT: f64 = 70.0;
 /// Width of the soft edge \[deg\].
 const SOFT: f64 = 20.0;
-/// Distance from midship within which nothing counts, and over which it begins to \[m\].
+/// Distance from midship within which pixels are masked, and width of the transition beyond it \[m\].
 const NEAR: [f64; 2] = [100.0, 60.0];
-/// Range wavenumbers of the skew, as fractions of the largest that a pixel carries: the sea's own waves, above the
-/// long ones that bunching makes.
+/// Range wavenumbers of the skew, as fractions of the largest that a pixel carries: the sea's own waves, above the long waves
+/// made by bunching.
 const BAND: [f64; 2] = [0.38, 1.0];
-/// Azimuth wavenumbers of the skew, likewise; 0 itself has no side.
+/// Azimuth wavenumbers of the skew, as fractions of the same; 0 has no sign.
 const AZIMUTH_BAND: [f64; 2] = [0.013, 0.64];
 
 /// Measures the sea in an image of intensity before speckle.
 ///
-/// - `ship`: midship (x, y) \[m\] and heading \[deg\] whose wake is left out; without a ship all counts
-/// - returns `None` for an image that is dark everywhere or holds a value that is no number
+/// - `ship`: midship (x, y) \[m\] and heading \[deg\] of the ship whose wake is masked; without a ship, all pixels count
+/// - returns `None` for an image that is dark everywhere or has a value that is not finite
 #[must_use]
 pub fn open_sea(
     intensity: &Field,
@@ -58,7 +58,7 @@ pub fn open_sea(
     })
 }
 
-/// 1 away from the wake, 0 in it.
+/// Weight of a place: 1 away from the wake, 0 in it.
 fn away([x, y]: [f64; 2], (position, heading): ([f64; 2], f64)) -> f64 {
     let astern = direction(heading + 180.0);
     let (dx, dy) = (x - position[0], y - position[1]);

@@ -1,4 +1,4 @@
-//! The spectrum of an image over rings of wavenumbers.
+//! Spectrum of an image over rings of wavenumbers.
 
 use super::spectrum::signed;
 use crate::fft::Synthesis;
@@ -16,10 +16,10 @@ pub enum Binning {
 
 /// Means over rings, from wavenumber 0 to the corner.
 ///
-/// Ring n holds the waves with about n periods in the image. Rings up to half the smaller side are whole.
+/// Ring n holds the waves with about n periods in the image. Rings up to half the smaller side are complete.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RadialSpectrum {
-    /// Wavenumbers in the ring.
+    /// Number of wavenumbers in the ring.
     pub count: Vec<u64>,
     /// Mean of ln(1 + |F|).
     pub log_magnitude: Vec<f64>,
@@ -35,7 +35,7 @@ pub struct RadialSpectrum {
 /// F(u, v) = Σ image·e^{−2πi(u i/rows + v j/columns)},    ring = √(u² + v²)
 /// ```
 ///
-/// The radius counts periods in the image, whatever its shape; F is not divided by anything.
+/// The radius counts periods in the image, whatever its shape; F is not normalised.
 #[must_use]
 pub fn radial_spectrum(image: &Field, binning: Binning) -> RadialSpectrum {
     let (rows, columns) = (image.rows, image.columns);

@@ -1,13 +1,13 @@
-//! Borders of squares that an image is put together from.
+//! Borders of the squares of which an image is composed.
 
 use crate::raster::Field;
 
-/// Mean squared difference of neighbours across the borders of squares, over that elsewhere \[1\], along rows or columns,
-/// whichever is the larger; `None` where nothing differs or there is no border.
+/// Mean squared difference of neighbours across the borders of squares, over the mean squared difference elsewhere \[1\], along
+/// rows or columns, whichever is larger; `None` where nothing differs or there is no border.
 ///
-/// 1 for an image that knows of no squares, more for one that was put together from them.
+/// 1 for an image without squares, larger for an image that is composed of them.
 ///
-/// - `side`: of a square, at least 2 \[pixels\]; the first begins at the first pixel
+/// - `side`: side of a square \[pixels\], at least 2; the first square begins at the first pixel
 #[must_use]
 pub fn seams(field: &Field, side: usize) -> Option<f64> {
     let ratio = |down: bool| {
@@ -63,8 +63,8 @@ mod tests {
             .collect()
     }
 
-    /// Squares that differ by noise of variance b under noise of variance 1: neighbours differ by 2 within them, by 2 + 2b
-    /// across their borders.
+    /// Squares that differ by noise of variance b under noise of variance 1: the mean squared difference of neighbours is 2
+    /// within the squares, 2 + 2b across their borders.
     #[test]
     fn borders_of_squares_are_seen() {
         let (noise, steps) = (white(5), white(6));
@@ -74,10 +74,10 @@ mod tests {
         assert!((seams(&even, 8).unwrap() - 1.0).abs() < error);
         let step = |i: usize, j: usize| 3.0 * steps[(i / 8) * SIDE + j / 8];
         let squares = field(|i, j| noise[i * SIDE + j] + step(i, j));
-        // 992 pairs of squares; borders that follow on each other share one, which is half as much again.
+        // 992 pairs of squares; consecutive borders share a square, which adds half as much again.
         let error = 4.0 * (3.0 / 992.0f64).sqrt();
         assert!((seams(&squares, 8).unwrap() / 10.0 - 1.0).abs() < error);
-        // Borders of other squares: as many steps as elsewhere.
+        // Borders of squares of another size: as many steps as elsewhere.
         assert!((seams(&squares, 7).unwrap() - 1.0).abs() < 0.5);
         assert_eq!(seams(&field(|_, _| 2.0), 8), None);
     }

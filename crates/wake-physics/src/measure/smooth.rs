@@ -3,10 +3,10 @@
 use crate::raster::Field;
 use rayon::prelude::*;
 
-/// Running means in a row; their variances add.
+/// Number of running means in a row; their variances add.
 const PASSES: usize = 3;
 
-/// Smooths with a bell of standard deviation `std` \[pixels\]; beyond the border the outermost pixel repeats.
+/// Smooths with a near-Gaussian of standard deviation `std` \[pixels\]; beyond the border the outermost pixel repeats.
 ///
 /// A running mean over 2h + 1 pixels has variance h(h + 1)/3; three of them come within a few per cent of a Gaussian.
 #[must_use]
@@ -27,7 +27,7 @@ pub fn smooth(field: &Field, std: f64) -> Field {
     field
 }
 
-/// The half-width whose three passes have the variance nearest below or at `std²`.
+/// Half-width whose three passes have about the variance `std²`.
 fn half_width(std: f64) -> usize {
     let variance = std * std / PASSES as f64;
     (0.5 * ((1.0 + 12.0 * variance).sqrt() - 1.0)).round() as usize
@@ -69,7 +69,7 @@ mod tests {
     use super::*;
     use crate::raster::Raster;
 
-    /// The response to a point has the sum 1 and the variance asked for, along both axes.
+    /// The response to a point has the sum 1 and the requested variance along both axes.
     #[test]
     fn a_point_becomes_a_bell_of_the_right_width() {
         let raster = Raster::image(81, 121, 1.0);

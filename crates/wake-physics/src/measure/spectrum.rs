@@ -1,4 +1,4 @@
-//! Power spectrum of the part of an image that a window shows.
+//! Power spectrum of the windowed part of an image.
 
 use super::smooth::smooth;
 use crate::fft::lattice_sum;
@@ -6,7 +6,7 @@ use crate::raster::{Field, Raster};
 use num_complex::Complex32;
 use std::f64::consts::TAU;
 
-/// Power over wavenumbers, per unit of the window's energy.
+/// Power by wavenumber, per unit of the window's energy.
 ///
 /// Row i and column j hold kx = j·2π/(columns·spacing), ky = i·2π/(rows·spacing), in the order of an FFT: 0, 1, …, then
 /// negative. y grows upward, so ky > 0 with kx > 0 is a wave whose crests fall from left to right.
@@ -18,7 +18,7 @@ pub(super) struct PowerSpectrum {
 /// Relative width of the taper at the border of the image.
 const TAPER: f64 = 1.0 / 16.0;
 
-/// Number of periods that a place in the order of an FFT stands for.
+/// Signed number of periods at an index in the order of an FFT.
 pub(super) fn signed(at: usize, count: usize) -> f64 {
     if 2 * at < count {
         at as f64
@@ -40,7 +40,7 @@ pub(super) fn window(raster: &Raster, inside: impl Fn([f64; 2]) -> f64 + Sync) -
 }
 
 impl PowerSpectrum {
-    /// Spectrum of `field` within `window`, its weighted mean taken away; `None` where the window is empty.
+    /// Spectrum of `field` within `window` after its weighted mean is subtracted; `None` where the window is empty.
     pub(super) fn of(field: &Field, window: &Field, spacing: f64) -> Option<Self> {
         let (rows, columns) = (field.rows, field.columns);
         let pairs = || field.values.iter().zip(&window.values);
@@ -85,7 +85,7 @@ impl PowerSpectrum {
         self.step[0].max(self.step[1])
     }
 
-    /// The same spectrum, smoothed over `std` steps.
+    /// The spectrum smoothed over `std` steps.
     pub(super) fn smoothed(&self, std: f64) -> Field {
         // Centred first, so that neighbours in wavenumber are neighbours in the field.
         let (rows, columns) = (self.power.rows, self.power.columns);
@@ -116,7 +116,7 @@ mod tests {
         })
     }
 
-    /// The strongest value of a plane wave lies at its wavenumber or its opposite, sign of ky included.
+    /// The strongest value of a plane wave lies at its wavenumber or the opposite one, including the sign of ky.
     #[test]
     fn a_plane_wave_is_a_peak_at_its_wavenumber() {
         for (rows, columns) in [(64, 96), (45, 50)] {

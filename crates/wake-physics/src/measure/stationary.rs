@@ -1,4 +1,4 @@
-//! Speed and heading from the waves that stand still beside the ship.
+//! Speed and heading from the waves that are stationary beside the ship.
 
 use super::spectrum::PowerSpectrum;
 use super::{Measured, angle_between};
@@ -8,22 +8,22 @@ use rayon::prelude::*;
 
 /// Speeds tried [m/s]: first, step, number.
 const SPEEDS: (f64, f64, usize) = (4.6, 0.3, 32);
-/// The fastest of them [m/s].
+/// Fastest speed tried [m/s].
 pub(super) const FASTEST: f64 = SPEEDS.0 + SPEEDS.1 * (SPEEDS.2 - 1) as f64;
-/// Headings tried to each side of the arms' \[deg\]: step, number.
+/// Headings tried to each side of the heading from the arms \[deg\]: step, number.
 const HEADINGS: (f64, i64) = (2.0, 15);
 /// Wavenumbers used: from this many steps of the spectrum …
 const LOWEST: f64 = 7.3;
 /// … to this fraction of the largest that a pixel carries.
 const HIGHEST: f64 = 0.57;
-/// Standard deviation of the ridge, and of the surroundings it must stand out of \[steps of the spectrum\].
+/// Standard deviations of the ridge and of the surroundings from which it must stand out \[steps of the spectrum\].
 const RIDGE: [f64; 2] = [1.0, 5.0];
-/// Score from which the ridge is believed.
+/// Score from which the ridge is accepted.
 const THRESHOLD: f64 = 7.0;
-/// Steps of the refinement.
+/// Number of refinement steps.
 const REFINEMENTS: usize = 8;
 
-/// One wavenumber: its direction, its size, and how strongly the wake has it.
+/// One wavenumber: its direction, its magnitude, and its strength in the wake.
 struct Cell {
     unit: [f64; 2],
     /// √(g/k), the phase speed [m/s].
@@ -39,17 +39,17 @@ pub(super) struct Velocity {
     pub(super) heading: Measured,
 }
 
-/// The velocity beside which the waves of `wake` stand still.
+/// The velocity beside which the waves of `wake` are stationary.
 ///
-/// A wave keeps its place beside the ship if the ship's velocity along its direction is its phase speed:
+/// A wave keeps its place beside the ship if the ship's velocity along the wave's direction is its phase speed:
 ///
 /// ```text
 /// k̂·U = √(g/k)          (the curve k = g/(U² cos²θ) in the plane of wavenumbers)
 /// ```
 ///
-/// Every wavenumber with energy is thus a line in the plane of velocities. The velocity through which most of them
-/// pass is searched on a lattice (matched filter: ridge minus surroundings) and refined by weighted least squares.
-/// Energy is ln(1 + P/(P₀ + max P₀)) with P₀ the smoothed spectrum of the sea opposite the wake.
+/// Every wavenumber with energy is thus a line in the plane of velocities. The velocity through which most lines pass is searched
+/// on a lattice (matched filter: ridge minus surroundings) and refined by weighted least squares. Energy is ln(1 + P/(P₀ + max
+/// P₀)) with P₀ the smoothed spectrum of the sea opposite the wake.
 ///
 /// # References
 ///
@@ -78,7 +78,7 @@ pub(super) fn velocity(
     };
     let [u, v] = refined(&cells, velocity_of(speed, tried));
     let (fine_speed, fine) = (u.hypot(v), u.atan2(v).to_degrees().rem_euclid(360.0));
-    // Steps back where the refinement ran away to another ridge.
+    // Falls back to the lattice where the refinement ran away to another ridge.
     let kept = (fine_speed - speed).abs() < 2.0 * SPEEDS.1
         && angle_between(fine, tried).abs() < 3.0 * HEADINGS.0;
     // A maximum at the end of the lattice is the flank of something beyond it.
@@ -100,7 +100,7 @@ fn velocity_of(speed: f64, heading: f64) -> [f64; 2] {
     [speed * sin, speed * cos]
 }
 
-/// Half of the wavenumber plane (the spectrum is even), strengths with mean 0 and standard deviation 1.
+/// Half of the wavenumber plane (the spectrum is even), with strengths scaled to mean 0 and standard deviation 1.
 fn cells(wake: &PowerSpectrum, sea: &Field, largest_wavenumber: f64) -> Vec<Cell> {
     let step = wake.resolution();
     let floor = sea.values.iter().copied().fold(0.0f32, f32::max);
@@ -135,7 +135,7 @@ fn cells(wake: &PowerSpectrum, sea: &Field, largest_wavenumber: f64) -> Vec<Cell
     cells
 }
 
-/// The matched filter at every speed on one heading.
+/// Scores of the matched filter at every speed on one heading.
 fn scores(cells: &[Cell], heading: f64) -> Vec<(f64, f64)> {
     let [ux, uy] = velocity_of(1.0, heading);
     let [narrow, wide] = RIDGE;
@@ -163,7 +163,7 @@ fn scores(cells: &[Cell], heading: f64) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Weighted least squares on ±k̂·U = c, weights renewed from the residuals.
+/// Weighted least squares on ±k̂·U = c, with weights updated from the residuals.
 fn refined(cells: &[Cell], start: [f64; 2]) -> [f64; 2] {
     let mut velocity = start;
     for _ in 0..REFINEMENTS {

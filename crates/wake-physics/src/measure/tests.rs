@@ -1,4 +1,4 @@
-//! Measurements on images whose truth is known: analytic wakes, simulated scenes, and images that show nothing.
+//! Measurements on images with known truth: analytic wakes, simulated scenes, and images without information.
 
 use super::*;
 use crate::constants::GRAVITY;
@@ -19,7 +19,7 @@ fn raster() -> Raster {
     Raster::image(256, 256, 4.0)
 }
 
-/// An image with mean 1 and independent normal numbers of standard deviation `std`.
+/// An image of mean 1 with independent normal noise of standard deviation `std`.
 fn noise(std: f64, seed: u64) -> Field {
     let mut field = Field::constant(&raster(), 1.0);
     for (i, row) in field.values.chunks_mut(256).enumerate() {
@@ -62,8 +62,8 @@ fn analytic_wake(speed: f64, heading: f64) -> Field {
     field
 }
 
-/// The closed form of the pattern gives its speed and heading back, in every quarter of the compass: turning the scene
-/// turns the heading and leaves the speed.
+/// Speed and heading are recovered from the closed form of the pattern, in every quarter of the compass: turning the scene turns
+/// the heading and leaves the speed.
 #[test]
 fn an_analytic_wake_gives_its_speed_and_heading() {
     for (speed, heading) in [
@@ -75,8 +75,8 @@ fn an_analytic_wake_gives_its_speed_and_heading() {
     ] {
         let found = measure_wake(&analytic_wake(speed, heading), &raster(), &SHIP);
         assert!(found.speed.measurable && found.heading.measurable);
-        // A step of the spectrum, 2π/1024 m, is 3 % of ν at 11 m/s; speed goes with its root, and the ridge is
-        // found to a third of a step.
+        // A step of the spectrum, 2π/1024 m, is 8 % of ν at 11 m/s, and so 4 % of the speed; the ridge is found to a fraction of
+        // a step.
         let error = angle_between(found.heading.value, heading);
         assert!(error.abs() < 1.0, "{heading}: {found:?}");
         assert!(
@@ -86,7 +86,7 @@ fn an_analytic_wake_gives_its_speed_and_heading() {
     }
 }
 
-/// Where nothing is, nothing is measured.
+/// Nothing is measured in images without information.
 #[test]
 fn images_without_information_are_not_measurable() {
     let black = Field::constant(&raster(), 0.0);
@@ -107,7 +107,7 @@ fn images_without_information_are_not_measurable() {
     }
     assert!(open_sea(&black, &raster(), None).is_none());
     assert!(open_sea(&broken, &raster(), None).is_none());
-    // Another size than the raster's.
+    // A raster of another size.
     let small = Raster::image(64, 64, 4.0);
     assert_eq!(
         measure_wake(&constant, &small, &SHIP)
@@ -131,8 +131,8 @@ fn scene(speed: f64, heading: f64, wind: f64, toward: f64, incidence: f64) -> Sc
     scene
 }
 
-/// Simulated scenes with known truth. The limits are the goals of the project for a generated image: 3° and 0.5 m/s;
-/// for the sea, what 0.3 dB of brightness is worth at the least measurable slopes.
+/// Simulated scenes with known truth. The limits for the wake are the goals of the project for a generated image, 3° and 0.5 m/s;
+/// for the sea, the error that 0.3 dB of brightness causes at the smallest measurable slopes.
 #[test]
 fn simulated_scenes_give_their_values_back() {
     let (mut axes, mut winds) = (0, 0);
@@ -155,7 +155,7 @@ fn simulated_scenes_give_their_values_back() {
         assert!((found.speed.value - speed).abs() < 0.5, "{found:?}");
         let sea = open_sea(&image, &raster(), Some(([0.0; 2], found.heading.value))).unwrap();
         let expected = mean_sigma0(&truth).unwrap();
-        // The mean over slopes is good to some per cent: 0.2 dB at 25°, where few facets near nadir count.
+        // The mean over slopes is accurate to some per cent: 0.2 dB at 25°, where few facets near nadir count.
         assert!((10.0 * (sea.mean / expected).log10()).abs() < 0.3);
         // Two winds may be equally bright; then neither is reported.
         if let Some(found) = wind_speed(&sea, &truth).unwrap().measurable_value() {
@@ -167,7 +167,7 @@ fn simulated_scenes_give_their_values_back() {
             measured.measurable && (measured.value - incidence).abs() < 1.3,
             "{measured:?}"
         );
-        // A sea whose skew is small does not say which diagonal it is.
+        // A sea with little skew does not determine the diagonal.
         if let Some(axis) = wind_axis(&sea, &truth).unwrap().measurable_value() {
             assert!(axis_between(axis, toward).abs() < 10.0, "{axis}");
             axes += 1;
@@ -193,7 +193,7 @@ fn open_sea_has_no_speed() {
     }
 }
 
-/// Brighter images are read as more wind and a smaller incidence.
+/// Brighter images give more wind and a smaller incidence.
 #[test]
 fn brightness_moves_the_measurements_the_right_way() {
     let truth = scene(10.0, 90.0, 5.0, 90.0, 30.0);
@@ -233,8 +233,8 @@ fn differences_of_directions_go_the_short_way() {
     }
 }
 
-/// In water where the ship runs at twice the speed of the longest waves, the wedge is Mach's: sin 30° = ½. Half of a
-/// disc of large radius about the bow would be 180° wide.
+/// In water where the ship is twice as fast as the longest waves, the wedge is Mach's: sin 30° = ½. Half of a disc of large
+/// radius about the bow would be 180° wide.
 #[test]
 fn a_supercritical_wedge_is_machs() {
     let raster = Raster::image(401, 401, 5.0);
@@ -252,7 +252,7 @@ fn a_supercritical_wedge_is_machs() {
     }
 }
 
-/// Where the arms may open wider than in deep water, no heading is read: a single arm of unknown opening has none.
+/// Where the arms may open wider than in deep water, no heading is measured: a single arm of unknown opening has none.
 #[test]
 fn a_wake_in_shallow_water_is_not_measurable() {
     let image = analytic_wake(8.0, 110.0);
@@ -264,7 +264,7 @@ fn a_wake_in_shallow_water_is_not_measurable() {
     }
 }
 
-/// The wedge by trigonometry: its width astern of the bow, nothing ahead, and the same when turned by a quarter.
+/// The wedge by trigonometry: its width astern of the bow, nothing ahead, and the same after a quarter turn.
 #[test]
 fn the_wedge_opens_astern_at_the_kelvin_angle() {
     let raster = Raster::image(201, 201, 5.0);

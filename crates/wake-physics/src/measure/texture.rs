@@ -4,27 +4,28 @@ use super::smooth::smooth;
 use crate::raster::Field;
 use serde::Serialize;
 
-/// Standard deviation of the bell that tells speckle from what lies beneath \[pixels\]: chosen.
+/// Standard deviation of the Gaussian that separates speckle from the image beneath \[pixels\] (chosen).
 const BELL: f64 = 8.0;
 
-/// A window with a pixel this many standard deviations over its mean holds a ship: chosen.
+/// Standard deviations over the mean from which a pixel is taken for a ship and its window is dropped (chosen).
 const SHIP: f64 = 8.0;
 
 /// Sides of the blocks whose means are compared \[pixels\].
 const BLOCKS: [usize; 2] = [8, 32];
 
-/// Most looks that can be distinguished: at these the amplitude varies by 1.6 %.
+/// Largest number of looks that can be distinguished: with 1,000 looks the amplitude varies by 1.6 %.
 const MOST_LOOKS: f64 = 1e3;
 
-/// Texture of an image of amplitude: medians over its windows of open sea.
+/// Texture of an amplitude image: medians over its windows of open sea.
 ///
-/// Speckle is the deviation from a smoothed image. Correlations and skewness do not depend on the grey scale of an image
-/// that is linear in amplitude; looks and variations do, where its black is not amplitude 0.
+/// Speckle is the deviation from a smoothed image. Correlations and skewness do not depend on the grey scale of an image that is
+/// linear in amplitude; looks and variations do, unless black is amplitude 0.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Texture {
     /// Number of windows.
     pub windows: usize,
-    /// Equivalent looks: those whose amplitude, the root of a Gamma distribution, varies as the speckle does; up to 1,000.
+    /// Equivalent number of looks: the amplitude of so many, the root of a Gamma distribution, varies as the speckle does; up to
+    /// 1,000.
     pub looks: f64,
     /// Correlation of speckle 1 to 4 pixels apart along a row.
     pub along_rows: [f64; 4],
@@ -36,7 +37,7 @@ pub struct Texture {
     pub block_variation: [f64; 2],
 }
 
-/// Texture of the windows of `side` pixels of an image that hold no ship; `None` where there is no such window.
+/// Texture over the windows of `side` pixels that hold no ship; `None` if there is no such window.
 ///
 /// - `amplitude`: √ of the intensity, or the grey of a quick-look
 #[must_use]
@@ -99,7 +100,8 @@ fn of_window(amplitude: &[f64], beneath: &[f64], side: usize) -> Option<Texture>
     })
 }
 
-/// Looks N whose amplitude has a variance over squared mean of N Γ(N)²/Γ(N + ½)² − 1, which falls with N; by bisection.
+/// Number of looks N at which the amplitude's variance over its squared mean, N Γ(N)²/Γ(N + ½)² − 1, has a given value; by
+/// bisection, as it falls with N.
 fn equivalent_looks(variation: f64) -> f64 {
     let of = |looks: f64| {
         let ratio = libm::lgamma(looks) - libm::lgamma(looks + 0.5);
@@ -117,13 +119,14 @@ fn equivalent_looks(variation: f64) -> f64 {
     high
 }
 
-/// Correlation of the amplitudes of two pixels of N looks whose intensities correlate by ρ².
+/// Correlation of the amplitudes of two pixels of N looks whose intensities have the correlation ρ².
 ///
 /// ```text
 /// (₂F₁(−½, −½; N; ρ²) − 1)/(₂F₁(−½, −½; N; 1) − 1)
 /// ```
 ///
-/// - `looks` N, at least 1; `intensities` ρ², 0 to 1
+/// - `looks`: N, at least 1
+/// - `intensities`: ρ², 0 to 1
 /// - returns ρ² for many looks, up to 0.03 less for one
 ///
 /// # References
@@ -175,8 +178,8 @@ mod tests {
         field
     }
 
-    /// Independent pixels of a Rayleigh amplitude: skewness 2√π(π − 3)/(4 − π)^{3/2} = 0.631, no correlation but that
-    /// of the bell taken away, block means 0.5227/block.
+    /// Independent pixels of a Rayleigh amplitude: skewness 2√π(π − 3)/(4 − π)^{3/2} = 0.631, no correlation except from the
+    /// subtracted smooth image, block means 0.5227/block.
     #[test]
     fn one_look_of_independent_pixels() {
         let found = texture(&amplitude(1), 256).unwrap();
@@ -184,12 +187,12 @@ mod tests {
         assert!((found.looks - 1.0).abs() < 0.03, "{found:?}");
         assert!((found.skewness - 0.631).abs() < 0.05, "{found:?}");
         for lag in found.along_rows.into_iter().chain(found.along_columns) {
-            // The bell of 8 pixels holds 1/(4π·64) of the variance and takes twice that away: below 3e-3.
+            // The Gaussian of 8 pixels holds 1/(4π·64) of the variance, and twice that is subtracted: below 3e-3.
             assert!(lag.abs() < 0.012, "{found:?}");
         }
         for (n, block) in BLOCKS.into_iter().enumerate() {
             let expected = 0.5227 / block as f64;
-            // 64 blocks a window: 9 % of scatter, the median of four has 5 %.
+            // With 64 blocks per window the scatter is 9 %, and 5 % for the median of four windows.
             assert!(
                 (found.block_variation[n] / expected - 1.0).abs() < 0.2,
                 "{found:?}"
@@ -197,7 +200,7 @@ mod tests {
         }
     }
 
-    /// A variance of 65,536 pixels has a standard error of √(2/65,536) = 0.0055, the median of four windows half of that.
+    /// A variance over 65,536 pixels has a standard error of √(2/65,536) = 0.0055, the median of four windows half of that.
     #[test]
     fn many_looks_are_found() {
         for looks in [4, 20] {
@@ -209,7 +212,7 @@ mod tests {
         }
     }
 
-    /// One look: 4/π − 1. Many: 1/(4N) + 1/(32N²), the next order being below 1/(100 N³).
+    /// Variance over squared mean: 4/π − 1 for one look, 1/(4N) + 1/(32N²) for many, the next order being below 1/(100 N³).
     #[test]
     fn looks_are_those_of_a_root_of_a_gamma_distribution() {
         let one = 4.0 / std::f64::consts::PI - 1.0;
@@ -221,7 +224,7 @@ mod tests {
         }
     }
 
-    /// Pairs of two looks each, ρ = 0.8: drawn, 200,000 of them. The error of a correlation r is (1 − r²)/√n, 0.0013.
+    /// 200,000 simulated pairs of two looks each with ρ = 0.8. The standard error of a correlation r is (1 − r²)/√n, 0.0013.
     #[test]
     fn amplitudes_correlate_less_than_intensities() {
         use rand_distr::{Distribution, StandardNormal};

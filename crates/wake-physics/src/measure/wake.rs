@@ -16,23 +16,23 @@ pub struct WakeMeasurement {
     pub speed: Measured,
 }
 
-/// Half-angle of the sector astern whose waves count, and of the one ahead that they are compared with \[deg\].
+/// Half-angle of the sector astern whose waves count, and of the sector ahead with which they are compared \[deg\].
 const SECTOR: f64 = 45.0;
 /// Width of the sector's soft edge \[deg\].
 const SOFT: f64 = 10.0;
-/// Distance from midship within which nothing counts, and over which it begins to \[m\].
+/// Distance from midship within which pixels are masked, and width of the transition beyond it \[m\].
 const NEAR: f64 = 60.0;
 /// Standard deviation of the smoothing of the sea's spectrum \[steps\].
 const SMOOTHING: f64 = 3.0;
-/// Darkest intensity relative to the mean, so that a black pixel is no infinity.
+/// Smallest intensity relative to the mean, which keeps black pixels finite in decibels.
 const DARKEST: f64 = 1e-4;
 
 /// Measures heading and speed in an image of intensity before speckle.
 ///
-/// The arms give the heading within some degrees, without ambiguity, since the wake opens astern. The waves that stand
-/// still beside the ship give speed and a finer heading, where the image carries them: crests that run along azimuth
-/// are smeared by the motion of the sea, so a ship within some 30° of the flight direction shows its heading by the
-/// arms alone and no speed.
+/// The arms give the heading to within a few degrees, without ambiguity, since the wake opens astern. The waves that are
+/// stationary beside the ship give the speed and a finer heading where the image carries them. Crests along azimuth are smeared
+/// by the motion of the sea, so for a ship within some 30° of the flight direction the heading follows from the arms alone and no
+/// speed is measurable.
 ///
 /// # Shapes
 ///
@@ -40,9 +40,9 @@ const DARKEST: f64 = 1e-4;
 ///
 /// # Validity
 ///
-/// Deep water, speeds of 4.6 to 13.9 m/s, one wake, its ship in the image. Not measurable are water so shallow that the
-/// fastest of these ships would open its arms by 2° more than in deep water (below 36 m), an image without variation, and
-/// one with nothing that looks like a wake.
+/// Deep water, speeds of 4.6 to 13.9 m/s, one wake, its ship in the image. Not measurable are wakes in water so shallow that the
+/// fastest of these ships would open its arms by 2° more than in deep water (below 36 m), images without variation, and images
+/// without anything like a wake.
 #[must_use]
 pub fn measure_wake(intensity: &Field, raster: &Raster, ship: &ShipPlace) -> WakeMeasurement {
     let nothing = WakeMeasurement {
@@ -75,7 +75,7 @@ pub fn measure_wake(intensity: &Field, raster: &Raster, ship: &ShipPlace) -> Wak
     }
 }
 
-/// The finer heading where it is measurable, else that of the arms.
+/// The finer heading where it is measurable, otherwise the heading from the arms.
 fn combined(arms: Measured, fine: Measured) -> Measured {
     if fine.measurable && arms.measurable {
         Measured {
@@ -87,7 +87,7 @@ fn combined(arms: Measured, fine: Measured) -> Measured {
     }
 }
 
-/// Intensity in decibel, mean taken away; `None` without any light or with a value that is no number.
+/// Intensity in decibels minus its mean; `None` for an image that is dark everywhere or has a value that is not finite.
 pub(super) fn decibel(intensity: &Field) -> Option<Field> {
     let mean = intensity.mean();
     if !(mean.is_finite() && mean > 0.0) {
@@ -105,7 +105,7 @@ pub(super) fn decibel(intensity: &Field) -> Option<Field> {
     Some(field)
 }
 
-/// A sector from midship, in the direction `towards`.
+/// Window over a sector from midship in the direction `towards`.
 fn sector(raster: &Raster, position: [f64; 2], towards: f64) -> Field {
     let [ax, ay] = direction(towards);
     window(raster, |[x, y]| {
@@ -118,10 +118,11 @@ fn sector(raster: &Raster, position: [f64; 2], towards: f64) -> Field {
     })
 }
 
-/// Which pixels lie inside the Kelvin wedge, astern of midship: where the wake, unlike the sea, is not random.
+/// Whether each pixel lies inside the Kelvin wedge, astern of midship, where the wake, unlike the sea, is not random.
 ///
-/// - `heading` [deg clockwise from azimuth]; `speed` [m/s]: with the depth it opens the wedge, see [`half_angle`]
-/// - returns one value a pixel, row after row
+/// - `heading`: [deg clockwise from azimuth]
+/// - `speed`: [m/s]; with the depth it sets the opening of the wedge, see [`half_angle`]
+/// - returns one value per pixel, row after row
 #[must_use]
 pub fn kelvin_wedge(raster: &Raster, ship: &ShipPlace, heading: f64, speed: f64) -> Vec<bool> {
     let [ax, ay] = direction(heading);

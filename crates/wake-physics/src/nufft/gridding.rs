@@ -1,16 +1,16 @@
-//! Which kernel, which lattice, which precision: the fastest that keeps a demand.
+//! Choice of kernel, lattice and precision: the fastest combination that meets the demanded error.
 
 use super::kernel::{Kernel, WIDEST};
 use crate::raster::Raster;
 
-/// Oversampling factors tried: finer lattices cost transforms, coarser ones wider kernels and rounding.
+/// Oversampling factors tried: finer lattices cost transforms; coarser ones need wider kernels and round more.
 const OVERSAMPLING: [f64; 5] = [1.2, 1.35, 1.5, 1.75, 2.0];
 
-/// Largest rounding error at a pixel over (machine epsilon · root of the sum of squares of the strengths), as
+/// Largest rounding error at a pixel, over (machine epsilon · root sum of squares of the strengths), as
 /// ROUNDING[0] + ROUNDING[1]·amplification²; measured, see the tests.
 const ROUNDING: [f64; 2] = [12.0, 1.2];
 
-/// Sum of the magnitudes and root of the sum of squares of the strengths of a field.
+/// Sum of the magnitudes and root sum of squares of a field's strengths.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Size {
     pub(crate) sum: f64,
@@ -18,7 +18,7 @@ pub(crate) struct Size {
 }
 
 impl Size {
-    /// rms of waves of unrelated phases.
+    /// Root mean square of waves with unrelated phases.
     pub(crate) fn expected_rms(self) -> f64 {
         self.root * std::f64::consts::FRAC_1_SQRT_2
     }
@@ -35,17 +35,17 @@ pub(crate) struct Gridding {
     pub(crate) double_precision: bool,
 }
 
-/// The error fields may have, relative to the sizes of their strengths.
+/// Allowed error of the fields, relative to the sizes of their strengths.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Demand {
     /// Error over the sum of |strength|.
     aliases: f64,
-    /// Error over the root of the sum of squares.
+    /// Error over the root sum of squares.
     rounding: f64,
 }
 
 impl Demand {
-    /// What keeps `tolerance`·rms for every field, half for aliases and half for rounding.
+    /// Strictest demand that keeps `tolerance`·rms for every field, half for aliases and half for rounding.
     pub(crate) fn strictest(fields: impl Iterator<Item = (Size, f64)>, tolerance: f64) -> Self {
         let mut demand = Self {
             aliases: 1.0,
@@ -61,9 +61,9 @@ impl Demand {
 }
 
 impl Gridding {
-    /// The cheapest gridding that meets a demand; where none does, the most exact one.
+    /// The cheapest gridding that meets a demand, or the most accurate one if none does.
     ///
-    /// `counts`: waves and fields.
+    /// - `counts`: number of waves and of fields
     pub(crate) fn fastest(demand: &Demand, raster: &Raster, counts: [usize; 2]) -> Self {
         let mut best = Self::new(1e-13, 2.0, raster, true);
         let mut cost = f64::INFINITY;
@@ -104,7 +104,7 @@ impl Gridding {
         }
     }
 
-    /// Largest rounding error over the root of the sum of squares of the strengths.
+    /// Largest rounding error over the root sum of squares of the strengths.
     pub(crate) fn rounding(&self) -> f64 {
         let epsilon = if self.double_precision {
             f64::EPSILON
@@ -119,7 +119,7 @@ impl Gridding {
         2.0 * self.kernel.error * size.sum + self.rounding() * size.root
     }
 
-    /// Time in nanoseconds on one core, roughly: transforms and spreading.
+    /// Rough time in nanoseconds on one core for transforms and spreading.
     fn cost(&self, [waves, fields]: [usize; 2]) -> f64 {
         let points = (self.lattice[0] * self.lattice[1]) as f64;
         let pairs = fields.div_ceil(2) as f64;
@@ -131,8 +131,8 @@ impl Gridding {
     }
 }
 
-/// The smallest length of at least `n` that is 8·2^a·3^b or five times that: even, as the lattice must be,
-/// and transformed in half the time a pixel of lengths with 5³ or 7.
+/// Smallest length of at least `n` of the form 8·2^a·3^b or five times that. It is even, as the lattice must be, and takes
+/// half the time per pixel of lengths with 5³ or 7.
 fn lattice_length(n: usize) -> usize {
     let mut m = n.div_ceil(8).max(1);
     loop {

@@ -1,11 +1,11 @@
-//! The kernel that carries a wave of any wavenumber onto the lattice of an FFT.
+//! Kernel that spreads a wave of any wavenumber onto the lattice of an FFT.
 
 use std::f64::consts::PI;
 
-/// Widest kernel.
+/// Width of the widest kernel, in lattice points.
 pub(crate) const WIDEST: usize = 16;
 
-/// The Kaiser–Bessel kernel on a lattice that is finer than needed.
+/// Kaiser–Bessel kernel on an oversampled lattice.
 ///
 /// ```text
 /// φ(z) = I₀(β√(1 − z²)) e^{−β},   |z| ≤ 1,   z = 2·distance/width
@@ -18,19 +18,19 @@ pub(crate) const WIDEST: usize = 16;
 /// (2003), IEEE Trans. Signal Process. 51(2), 560 (for the transform).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Kernel {
-    /// Lattice points the kernel covers along an axis.
+    /// Lattice points that the kernel covers along an axis.
     pub(crate) width: usize,
-    /// Oversampling σ: lattice points along an axis over pixels.
+    /// Oversampling σ: lattice points per pixel along an axis.
     pub(crate) oversampling: f64,
     /// Bound on the error along an axis, relative to the sum of all |strength|.
     pub(crate) error: f64,
-    /// How much larger the factor that undoes the kernel is at the raster's edge than in its middle.
+    /// Ratio of the correction factor at the raster's edge to that in its middle.
     pub(crate) amplification: f64,
     beta: f64,
 }
 
 impl Kernel {
-    /// The narrowest kernel whose aliases stay below `error`, or the widest there is.
+    /// The narrowest kernel whose aliases stay below `error`, or the widest available.
     pub(crate) fn new(error: f64, oversampling: f64) -> Self {
         (2..WIDEST)
             .map(|width| Self::of_width(width, oversampling))
@@ -47,7 +47,7 @@ impl Kernel {
             amplification: 1.0,
             beta: PI * (span * span - 0.8).max(0.01).sqrt(),
         };
-        // Aliases are largest for pixels at the edge, half a raster from the middle.
+        // Aliases are largest at the edge, half a raster from the middle.
         let edge = 0.5 / oversampling;
         let wanted = kernel.transform(edge);
         let tiles = [1.0 - edge, 1.0 + edge, 2.0 - edge, 2.0 + edge];
@@ -57,7 +57,7 @@ impl Kernel {
         kernel
     }
 
-    /// Fourier transform of φ at a pixel, `part` of the lattice's period from the middle, inside the raster.
+    /// Fourier transform of φ at a pixel inside the raster, at the fraction `part` of the lattice's period from the middle.
     ///
     /// ```text
     /// ∫ φ cos(2π part·distance) d(distance) = width sinh(r)/r · e^{−β},   r² = β² − (π width part)²
@@ -76,9 +76,9 @@ impl Kernel {
         self.width as f64 / r * (-self.beta).exp()
     }
 
-    /// φ at `out.len()` ≤ [`WIDEST`] lattice points: the first at `distance`, each one farther on.
+    /// φ at `out.len()` ≤ [`WIDEST`] consecutive lattice points, the first at `distance`.
     ///
-    /// The power series of I₀ has positive terms only; term k is (β²(1 − z²)/4)^k/(k!)².
+    /// All terms of the power series of I₀ are positive; term k is (β²(1 − z²)/4)^k/(k!)².
     #[inline(always)]
     pub(crate) fn values(&self, distance: f64, out: &mut [f64]) {
         match out.len() {
@@ -89,7 +89,7 @@ impl Kernel {
         }
     }
 
-    /// [`Self::values`] of at most `N` points, side by side in vectors.
+    /// [`Self::values`] of at most `N` points, computed in vector lanes.
     #[inline(always)]
     fn side_by_side<const N: usize>(&self, distance: f64, out: &mut [f64]) {
         let mut powers = [0.0; N];
@@ -110,7 +110,7 @@ impl Kernel {
         out.copy_from_slice(&sums[..out.len()]);
     }
 
-    /// Factors that undo the kernel, one per pixel of a side of `pixels` on a lattice of `lattice` points.
+    /// Correction factors that undo the kernel, one per pixel along a side of `pixels` on a lattice of `lattice` points.
     pub(crate) fn correction(&self, pixels: usize, lattice: usize) -> Vec<f64> {
         let half = pixels / 2;
         let factor = |i: usize| {
@@ -126,7 +126,7 @@ mod tests {
     use super::*;
     use crate::numeric::GaussLegendre;
 
-    /// A sum over the lattice of the spread wave, corrected, is the wave to the error the kernel states.
+    /// The corrected lattice sum of a spread wave equals the wave within the kernel's stated error.
     #[test]
     fn spread_wave_comes_back() {
         for (error, pixels, lattice) in [
@@ -162,13 +162,13 @@ mod tests {
                     worst = worst.max((re * factor - 1.0).hypot(im * factor));
                 }
             }
-            // Never above the stated error, and the statement says something: within a factor 10 of it.
+            // The error never exceeds the stated one, which is tight: within a factor of 10.
             assert!(worst <= kernel.error, "{worst:e} {kernel:?}");
             assert!(worst >= 0.1 * kernel.error, "{worst:e} {kernel:?}");
         }
     }
 
-    /// The closed transform against Gauss quadrature of the series.
+    /// Closed form of the transform against Gauss quadrature of the series.
     #[test]
     fn transform_is_the_integral() {
         let kernel = Kernel::of_width(9, 1.5);

@@ -1,14 +1,14 @@
-//! Plane waves of any wavenumbers, summed on a raster by a non-uniform FFT (type 1).
+//! Sum of plane waves of arbitrary wavenumbers on a raster by a non-uniform FFT (type 1).
 //!
-//! Each wave is spread with a smooth kernel onto a lattice of wavenumbers finer than the raster's own, one
-//! FFT sums the lattice, and a factor per pixel undoes the kernel. An exact lattice sum of the spread waves
-//! repeats the field in neighbouring tiles; what the kernel leaves of them is the error:
+//! Each wave is spread with a smooth kernel onto a lattice of wavenumbers finer than the raster's own, one FFT sums the
+//! lattice, and a factor per pixel undoes the kernel. An exact lattice sum of the spread waves repeats the field in
+//! neighbouring tiles; what the kernel lets through of these is the error:
 //!
 //! ```text
 //! computed(p) = Σₘ f(p + m·tile) φ̂(p + m·tile)/φ̂(p),     |error| ≤ 2 ε Σ|strength|,  ε the kernel's error an axis
 //! ```
 //!
-//! Two real fields share a complex transform: with strengths c, d of the two,
+//! Two real fields share one complex transform: with strengths c and d,
 //! f + ig = ½ Σ [(c + id) e^{ik·x} + (c̄ + id̄) e^{−ik·x}].
 //!
 //! # References
@@ -29,27 +29,26 @@ use rayon::prelude::*;
 use spread::{Before, Footprints};
 use std::f64::consts::TAU;
 
-/// How often the error is checked against the computed fields and improved.
+/// Number of attempts: the error is checked against the computed fields, and weak fields are recomputed.
 const ATTEMPTS: usize = 3;
 
-/// Sums plane waves on a raster, one field a quantity, to a tolerance.
+/// Sums plane waves on a raster, one field per quantity, to a tolerance.
 ///
 /// ```text
 /// max |fast − harmonic_sum| ≤ tolerance · rms(field)
 /// ```
 ///
-/// Width of the kernel, fineness of the lattice and precision follow from the tolerance and the strengths;
-/// the bound is checked against the fields that come out, and fields much weaker than the sum of their waves
-/// are computed again, more exactly.
+/// Kernel width, lattice size and precision follow from the tolerance and the strengths. The error bound is checked against
+/// the resulting fields, and fields much weaker than the sum of their waves are recomputed more accurately.
 ///
-/// - `waves`: wavenumbers inside the raster's square |kx|, |ky| ≤ π/spacing (others are seen as their aliases,
-///   as pixels see them)
+/// - `waves`: wavenumbers inside the raster's square |kx|, |ky| ≤ π/spacing (waves outside appear as their aliases on the
+///   pixels)
 /// - `tolerance`: 1e-6 to 0.1
 ///
 /// # Validity
 ///
-/// Fields are `f32`: a value carries a rounding of 6e-8 of itself. No field is more exact than 1e-12 of the
-/// sum of its |strength|.
+/// Fields are `f32`: each value is rounded to 6e-8 of itself. No field is more accurate than 1e-12 of the sum of its
+/// |strength|.
 #[must_use]
 pub fn synthesize(
     waves: &PlaneWaves,
@@ -71,7 +70,7 @@ pub fn synthesize(
     fields
 }
 
-/// Waves, and the quantities of them that are summed on a raster.
+/// Waves, and the quantities that are summed from them on a raster.
 #[derive(Clone, Copy)]
 pub(crate) struct Summands<'a> {
     pub(crate) waves: &'a PlaneWaves,
@@ -80,11 +79,11 @@ pub(crate) struct Summands<'a> {
     pub(crate) raster: &'a Raster,
 }
 
-/// [`synthesize`], one field at a time: `take` gets the number of a quantity and its field, once each and in any
-/// order; what it leaves of the field is overwritten. Fields that are 0 everywhere are not computed.
+/// [`synthesize`], one field at a time: `take` is called once per quantity, in any order, with its index and its field,
+/// which is overwritten afterwards. Fields that are 0 everywhere are not computed.
 ///
-/// Returns the largest bound on the error of a field, relative to its root mean square: above `tolerance` where no
-/// kernel is that exact; 0 where nothing is computed.
+/// Returns the largest bound on the error of a field, relative to its root mean square: above `tolerance` if no kernel is
+/// accurate enough, 0 if nothing is computed.
 pub(crate) fn synthesize_each(
     workspace: &mut Workspace,
     summands: Summands<'_>,
@@ -95,10 +94,10 @@ pub(crate) fn synthesize_each(
     sums.compute(workspace, summands.waves.len(), tolerance, take)
 }
 
-/// Fields Σₙ Re[sₙ exp(i kₙ·x)] of waves whose strengths s are given, one field a set of strengths: as exact as
+/// Fields Σₙ Re[sₙ exp(i kₙ·x)] of waves with given strengths s, one field per set of strengths, as accurate as
 /// [`synthesize`]; `take` as in [`synthesize_each`].
 ///
-/// - `wavenumbers`: kx and ky [rad/m], as many as each set has strengths
+/// - `wavenumbers`: kx and ky [rad/m], as many as strengths in each set
 pub(crate) fn sum_strengths(
     workspace: &mut Workspace,
     wavenumbers: [&[f64]; 2],
@@ -113,7 +112,7 @@ pub(crate) fn sum_strengths(
 }
 
 impl CentredSums<'_> {
-    /// Computes all fields, of `waves` waves.
+    /// Computes all fields from `waves` waves.
     fn compute(
         &self,
         workspace: &mut Workspace,
@@ -134,7 +133,7 @@ impl CentredSums<'_> {
             let gridding = Gridding::fastest(&demand, raster, [waves, todo.len()]);
             let mut again = Vec::new();
             let check = |q: usize, field: &mut Field| {
-                // A field below its own error says nothing yet; the estimate falls, but never to nothing.
+                // A field below its own error is unreliable; the estimate falls, but never to zero.
                 rms[q] = field.rms().max(1e-6 * rms[q]);
                 let error = gridding.error_bound(&sums.sizes[q]) / rms[q];
                 if attempt < ATTEMPTS && error > tolerance {
@@ -155,30 +154,30 @@ impl CentredSums<'_> {
     }
 }
 
-/// Waves that one thread looks at by itself.
+/// Smallest number of waves per parallel task.
 const MANY: usize = 1 << 12;
 
-/// Waves that are spread at once: of more, only the waves themselves are held. Chosen: about a gibibyte.
+/// Waves spread at once; beyond that, only the waves themselves are held in memory. Chosen: about a gibibyte.
 pub(crate) const WAVES_AT_ONCE: usize = 1 << 22;
 
-/// Waves with their phases counted from the raster's middle pixel.
+/// Waves with phases relative to the raster's middle pixel.
 struct CentredSums<'a> {
     raster: &'a Raster,
-    /// What parts are made of, where not all waves are spread at once.
+    /// Source of the parts if not all waves are spread at once.
     summands: Option<Summands<'a>>,
-    /// One a quantity.
+    /// One size per quantity.
     sizes: Vec<Size>,
-    /// All waves, where they are spread at once.
+    /// All waves, if they are spread at once.
     whole: Option<Part>,
-    /// Waves of a part where they are not.
+    /// Number of waves per part otherwise.
     at_once: usize,
 }
 
-/// Some of the waves.
+/// A part of the waves.
 struct Part {
-    /// Wavenumbers along y and x, in cycles a pixel.
+    /// Wavenumbers along y and x, in cycles per pixel.
     cycles: Vec<[f64; 2]>,
-    /// One vector a quantity.
+    /// One vector per quantity.
     strengths: Vec<Vec<Complex64>>,
 }
 
@@ -222,7 +221,7 @@ impl Part {
         Footprints::new(&scaled, &gridding.kernel, gridding.lattice)
     }
 
-    /// What k and −k carry for a pair of quantities: (c + id)/2 and (c̄ + id̄)/2.
+    /// Strengths at k and −k for a pair of quantities: (c + id)/2 and (c̄ + id̄)/2.
     fn paired<T: Real>(&self, pair: &[usize]) -> Vec<[Complex<T>; 2]> {
         let first = &self.strengths[pair[0]];
         let second = pair.get(1).map(|&q| &self.strengths[q]);
@@ -245,7 +244,9 @@ impl Part {
 }
 
 impl<'a> CentredSums<'a> {
-    /// - `at_once`: waves that are spread at once
+    /// Waves to be summed, all at once or in parts.
+    ///
+    /// - `at_once`: largest number of waves spread at once
     fn new(summands: Summands<'a>, at_once: usize) -> Self {
         let Summands {
             waves,
@@ -276,7 +277,7 @@ impl<'a> CentredSums<'a> {
         .sized(count)
     }
 
-    /// With the sizes of the strengths of `count` fields.
+    /// Computes the sizes of the strengths of `count` fields.
     fn sized(mut self, count: usize) -> Self {
         let mut totals = vec![[0.0; 2]; count];
         self.each_part(|part| {
@@ -297,7 +298,7 @@ impl<'a> CentredSums<'a> {
         self
     }
 
-    /// Looks at the waves, part by part.
+    /// Visits the waves, part by part.
     fn each_part(&self, mut look: impl FnMut(&Part)) {
         if let Some(part) = &self.whole {
             return look(part);
@@ -315,7 +316,7 @@ impl<'a> CentredSums<'a> {
         }
     }
 
-    /// Computes the fields numbered `todo`, two at a time, and hands each to `done`.
+    /// Computes the fields with the indices `todo`, two at a time, and passes each to `done`.
     fn run<T: Real>(
         &self,
         workspace: &mut Workspace,
@@ -357,7 +358,7 @@ impl<'a> CentredSums<'a> {
             }
             blocks.give(lattice);
         } else {
-            // A lattice a pair, so that no part is looked at twice.
+            // One lattice per pair, so that each part is visited only once.
             let mut lattices: Vec<Vec<Complex<T>>> = todo
                 .chunks(2)
                 .map(|_| blocks.take(rows * columns))

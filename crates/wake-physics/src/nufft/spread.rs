@@ -9,14 +9,14 @@ use rayon::prelude::*;
 /// Lines of the transposed lattice that one task owns.
 const LINES: usize = 16;
 
-/// Places that one task looks at.
+/// Footprints per parallel task.
 const TOGETHER: usize = 256;
 
-/// Places that are sorted by all threads. Chosen: the two sorts put equal places in other orders, so sums differ by rounding,
-/// and the waves of ships that go straight are fewer.
+/// Number of footprints from which they are sorted in parallel. Chosen: the two sorts order equal keys differently, so sums
+/// differ by rounding, and ships on straight courses have fewer waves.
 const MANY: usize = 1 << 19;
 
-/// Where each wave and its mirror image (wavenumber −k) touch the lattice, and with which weights.
+/// Lattice points and weights of each wave and its mirror image (wavenumber −k).
 ///
 /// Sorted by line, so that a task finds the waves that touch its own lines.
 #[derive(Debug)]
@@ -29,10 +29,10 @@ pub(crate) struct Footprints<T> {
     weights: Vec<T>,
 }
 
-/// What a lattice holds before waves are added.
+/// Content of a lattice before waves are added.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Before {
-    /// Anything: it is cleared.
+    /// Arbitrary: it is cleared first.
     Nothing,
     /// Other waves.
     Waves,
@@ -47,7 +47,7 @@ struct Place {
 }
 
 impl<T: Real> Footprints<T> {
-    /// `waves` are wavenumbers in lattice steps (along y, along x).
+    /// - `waves`: wavenumbers in lattice steps (along y, along x)
     pub(crate) fn new(waves: &[[f64; 2]], kernel: &Kernel, lattice: [usize; 2]) -> Self {
         let width = kernel.width;
         let place = |n: usize| {
@@ -99,7 +99,7 @@ impl<T: Real> Footprints<T> {
 
     /// Adds all waves to the transposed lattice `[columns, rows]`.
     ///
-    /// `strengths` holds for each wave what its wavenumber k and what −k carries.
+    /// `strengths` holds for each wave the strengths at its wavenumber k and at −k.
     pub(crate) fn spread(
         &self,
         strengths: &[[Complex<T>; 2]],
@@ -129,7 +129,7 @@ impl<T: Real> Footprints<T> {
         let rows = self.lattice[0];
         let first = bin * LINES;
         let last = first + lines.len() / rows;
-        // Kernels that begin in the bin or up to width − 1 columns before it, around the end too.
+        // Kernels that begin in the bin or up to width − 1 columns before it, with wrap-around.
         let before = first as i64 - self.width as i64 + 1;
         self.add(
             self.range(before.max(0), last as i64),
@@ -183,7 +183,7 @@ impl<T: Real> Footprints<T> {
     }
 }
 
-/// Adds `strength` times the weights to a line from `start` on, around its end.
+/// Adds `strength` times the weights to a line from index `start`, with wrap-around.
 #[inline(always)]
 fn add_wrapped<T: Real>(
     line: &mut [Complex<T>],
@@ -228,7 +228,7 @@ fn fill<T: Real>(out: &mut [T], g: f64, kernel: &Kernel) {
 mod tests {
     use super::*;
 
-    /// Waves that are sorted by all threads, and the same waves in two parts that are not.
+    /// Spreads enough waves to be sorted in parallel, and the same waves in two parts that are not.
     #[test]
     fn many_waves_are_spread_as_few_are() {
         let kernel = Kernel::new(1e-3, 1.5);

@@ -28,7 +28,7 @@ fn summands<'a>(waves: &'a PlaneWaves, raster: &'a Raster) -> Summands<'a> {
     }
 }
 
-/// Waves all over the band with deterministic, unrelated phases.
+/// Waves spread over the band, with deterministic, unrelated phases.
 fn scattered(raster: &Raster, count: usize) -> PlaneWaves {
     let mut waves = PlaneWaves::default();
     let band = raster.nyquist_wavenumber();
@@ -38,7 +38,7 @@ fn scattered(raster: &Raster, count: usize) -> PlaneWaves {
         let phase = 7.3 * n as f64 * n as f64;
         waves.push(k, 3.0, Complex64::from_polar(0.2 + a, phase));
     }
-    // The corners and edges of the band, the mean, and twice the same wave.
+    // The corners and edges of the band, the mean, and one wave twice.
     for k in [
         [band, band],
         [-band, 0.0],
@@ -51,8 +51,7 @@ fn scattered(raster: &Raster, count: usize) -> PlaneWaves {
     waves
 }
 
-/// Largest error over the field's rms, field by field, on all or on many pixels; the rounding of the result
-/// to `f32` taken off.
+/// Largest error over the field's rms for each field, on all or many pixels, minus the rounding of the result to `f32`.
 fn errors(waves: &PlaneWaves, raster: &Raster, tolerance: f64) -> Vec<f64> {
     let fields = synthesize(waves, &TRANSFER, &ALL, raster, tolerance);
     let stride = raster.len().div_ceil(2000).max(1) | 1;
@@ -81,7 +80,7 @@ fn errors(waves: &PlaneWaves, raster: &Raster, tolerance: f64) -> Vec<f64> {
         .collect()
 }
 
-/// The contract, over tolerances and rasters square, long, prime, tiny and far from the origin.
+/// The tolerance holds at all levels on square, long, prime-sized and tiny rasters and far from the origin.
 #[test]
 fn tolerance_is_met_at_every_level() {
     let mut far = Raster::image(33, 70, 1.3);
@@ -107,7 +106,7 @@ fn tolerance_is_met_at_every_level() {
     }
 }
 
-/// More accuracy is computed when more is asked for, not always the most.
+/// The accuracy follows the tolerance, rather than always being the best.
 #[test]
 fn work_follows_the_tolerance() {
     let raster = Raster::image(128, 128, 2.5);
@@ -123,7 +122,7 @@ fn work_follows_the_tolerance() {
     assert!(errors(&waves, &raster, 1e-1).iter().any(|&e| e > 1e-6));
 }
 
-/// Strong waves that cancel on the raster: the weak field left is still right to its own rms.
+/// Strong waves that cancel on the raster: the weak remaining field is still accurate relative to its own rms.
 #[test]
 fn cancelling_waves_keep_their_tolerance() {
     let raster = Raster::image(40, 40, 1.0);
@@ -146,8 +145,7 @@ fn no_wave_is_a_flat_sea() {
     assert!(synthesize(&scattered(&raster, 3), &TRANSFER, &[], &raster, 1e-3).is_empty());
 }
 
-/// The rounding of the `f32` transform against the same in `f64`: below its stated bound, which is within a
-/// factor 20 of it.
+/// Rounding of the `f32` transform against `f64` stays below its stated bound, which is tight within a factor of 20.
 #[test]
 fn rounding_is_bounded() {
     for (rows, columns) in [(64, 64), (300, 250), (45, 700)] {
@@ -183,7 +181,7 @@ fn rounding_is_bounded() {
     }
 }
 
-/// Waves spread in parts make the fields that all at once make, to the rounding of the sums; sizes are the same bits.
+/// Waves spread in parts give the same fields as all at once, within rounding; sizes are bit-identical.
 #[test]
 fn parts_of_the_waves_make_the_same_fields() {
     let raster = Raster::image(40, 56, 2.0);
@@ -211,7 +209,7 @@ fn parts_of_the_waves_make_the_same_fields() {
         let (parts, same) = fields(at_once);
         assert_eq!(sizes, same, "{at_once}");
         for (a, b) in whole.iter().zip(&parts) {
-            // Rounded to f32, 6e-8 of a value; the largest is some three times the rms.
+            // Rounded to f32, 6e-8 of a value; the largest value is about three times the rms.
             assert!(
                 a.rms() > 0.0 && a.difference(b).0 <= 4e-7 * a.rms(),
                 "{at_once}"

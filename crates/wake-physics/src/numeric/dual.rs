@@ -1,8 +1,8 @@
-//! Numbers with their derivatives by N values: arithmetic that carries both.
+//! Dual numbers: values with their derivatives by N variables.
 
 use std::ops::{Add, Mul, Sub};
 
-/// A number and its derivatives.
+/// A value and its derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Dual<const N: usize> {
     pub(crate) value: f64,
@@ -10,7 +10,7 @@ pub(crate) struct Dual<const N: usize> {
 }
 
 impl<const N: usize> Dual<N> {
-    /// A number that no value changes.
+    /// A constant, with zero derivatives.
     #[inline(always)]
     pub(crate) fn constant(value: f64) -> Self {
         Self {
@@ -19,7 +19,7 @@ impl<const N: usize> Dual<N> {
         }
     }
 
-    /// f of the number, given f and its slope there.
+    /// Applies a function to the number, given the function's value and slope there.
     #[inline(always)]
     pub(crate) fn map(self, value: f64, slope: f64) -> Self {
         Self {
@@ -82,7 +82,7 @@ impl<const N: usize> Mul for Dual<N> {
 mod tests {
     use super::*;
 
-    /// By hand at x = 2 with dx = 3: (x² e^x − x)' = (2x + x²) e^x x' − x'.
+    /// Worked out by hand at x = 2 with dx = 3: (x² e^x − x)' = (2x + x²) e^x x' − x'.
     #[test]
     fn the_rules_of_differentiation() {
         let x = Dual {

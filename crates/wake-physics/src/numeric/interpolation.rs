@@ -1,6 +1,6 @@
-//! Interpolation between points of equal distance.
+//! Interpolation between equidistant points.
 
-/// Weights of four points at a place `t` (0 to 1) between the middle two, by the cubic of Catmull and Rom (1974).
+/// Weights of four points at a position `t` (0 to 1) between the middle two, by the cubic of Catmull and Rom (1974).
 pub(crate) fn catmull_rom(t: f64) -> [f64; 4] {
     [
         ((2.0 - t) * t - 1.0) * t,

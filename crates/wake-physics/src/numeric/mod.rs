@@ -1,4 +1,4 @@
-//! Numerical methods that know nothing of the sea: roots and extrema, quadrature, interpolation, functions in vector instructions.
+//! General numerical methods: roots and extrema, quadrature, interpolation, vectorised functions.
 
 mod dual;
 mod interpolation;

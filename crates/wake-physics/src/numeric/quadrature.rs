@@ -1,4 +1,4 @@
-//! Gauss–Legendre and Gauss–Hermite quadrature, and how many nodes an oscillating integrand needs.
+//! Gauss–Legendre and Gauss–Hermite quadrature, and the number of nodes for an oscillating integrand.
 
 use super::search::root;
 use std::f64::consts::PI;
@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct GaussLegendre {
-    /// Nodes tᵢ, falling.
+    /// Nodes tᵢ, in descending order.
     pub nodes: Vec<f64>,
     /// Weights wᵢ, above 0.
     pub weights: Vec<f64>,
@@ -36,7 +36,7 @@ impl GaussLegendre {
         Self { nodes, weights }
     }
 
-    /// Nodes and weights moved to [from, to].
+    /// Nodes and weights mapped to [from, to].
     pub(crate) fn on(&self, from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> + '_ {
         let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
         self.nodes
@@ -61,9 +61,9 @@ fn legendre(n: usize, t: f64) -> (f64, f64) {
     (p, n as f64 * (before - t * p) / (1.0 - t * t))
 }
 
-/// Largest phase a panel of `count` Gauss–Legendre nodes may span at a given error.
+/// Largest phase that a panel of `count` Gauss–Legendre nodes may span for a given error.
 ///
-/// The remainder of the rule on exp(iωt), t in [−1, 1], has the bound
+/// The remainder of the rule for exp(iωt), t in [−1, 1], is bounded by
 ///
 /// ```text
 /// |E| ≤ 2^(2n+1) (n!)⁴ / ((2n+1) ((2n)!)³) · ω^(2n)
@@ -86,9 +86,9 @@ pub(crate) fn largest_phase(count: usize, error: f64) -> f64 {
     2.0 * ((error.ln() - ln_bound) / (2.0 * n)).exp()
 }
 
-/// For each count nodes and weights of the mean over a unit Gaussian, exact to the power 2·count − 1.
+/// For each count, nodes and weights of the mean over a unit Gaussian, exact to degree 2·count − 1.
 ///
-/// The nodes are the zeros of the Hermite polynomial, which lie between those of the one before.
+/// The nodes are the zeros of the Hermite polynomial, which interlace with those of the previous degree.
 pub(crate) fn gauss_hermite(counts: &[usize]) -> Vec<Vec<[f64; 2]>> {
     let largest = counts.iter().copied().max().unwrap_or(0);
     let (mut zeros, mut rules) = (Vec::new(), Vec::new());
@@ -105,7 +105,8 @@ pub(crate) fn gauss_hermite(counts: &[usize]) -> Vec<Vec<[f64; 2]>> {
     rules
 }
 
-/// The Hermite polynomial of degree `n` at x, of mean square 1 over a unit Gaussian, and the sum of the squares of those before.
+/// Hermite polynomial of degree `n` at x, with mean square 1 over a unit Gaussian, and the sum of squares of the lower
+/// ones.
 fn hermite(n: usize, x: f64) -> [f64; 2] {
     let (mut before, mut p, mut squares) = (0.0, 1.0, 0.0);
     for k in 0..n {
@@ -120,7 +121,7 @@ fn hermite(n: usize, x: f64) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    /// Exact up to degree 2n − 1 and not at degree 2n.
+    /// Exact up to degree 2n − 1, but not at degree 2n.
     #[test]
     fn degree_of_exactness() {
         for n in [1, 2, 5, 16] {
@@ -146,7 +147,7 @@ mod tests {
         assert!((rule.weights[1] - 8.0 / 9.0).abs() < 1e-15);
     }
 
-    /// The bound holds: ∫ exp(iωt) = 2 sin ω/ω up to the error asked for, at every level.
+    /// ∫ exp(iωt) = 2 sin ω/ω within the demanded error, at every level.
     #[test]
     fn phase_limit_keeps_the_error() {
         let rule = GaussLegendre::new(32);

@@ -1,6 +1,6 @@
 //! Roots and extrema of functions of one variable.
 
-/// A zero of `f` between two points of unlike sign, by halving the interval `steps` times.
+/// Zero of `f` between two points of opposite sign, by bisecting the interval `steps` times.
 pub(crate) fn root(f: impl Fn(f64) -> f64, [mut from, mut to]: [f64; 2], steps: usize) -> f64 {
     let sign = f(from) > 0.0;
     for _ in 0..steps {
@@ -14,7 +14,7 @@ pub(crate) fn root(f: impl Fn(f64) -> f64, [mut from, mut to]: [f64; 2], steps: 
     0.5 * (from + to)
 }
 
-/// The place of the smallest value of a function with one valley, by thirds of the interval.
+/// Position of the minimum of a unimodal function, by ternary search.
 pub(crate) fn smallest_at(f: impl Fn(f64) -> f64, [mut a, mut b]: [f64; 2], steps: usize) -> f64 {
     for _ in 0..steps {
         let (p, q) = (a + (b - a) / 3.0, b - (b - a) / 3.0);
@@ -27,7 +27,7 @@ pub(crate) fn smallest_at(f: impl Fn(f64) -> f64, [mut a, mut b]: [f64; 2], step
     0.5 * (a + b)
 }
 
-/// The largest value of a function with one peak in an interval, by golden sections: one evaluation a step.
+/// Maximum of a unimodal function on an interval, by golden-section search: one evaluation per step.
 pub(crate) fn largest(f: impl Fn(f64) -> f64, [mut low, mut high]: [f64; 2], steps: usize) -> f64 {
     let golden = 0.5 * (5f64.sqrt() - 1.0);
     let inner = |low: f64, high: f64| [high - golden * (high - low), low + golden * (high - low)];
@@ -53,7 +53,8 @@ pub(crate) fn largest(f: impl Fn(f64) -> f64, [mut low, mut high]: [f64; 2], ste
 mod tests {
     use super::*;
 
-    /// 50 halvings of a unit interval leave 2⁻⁵¹, 40 thirds (2/3)⁴⁰ = 9e-8, of which the value near an extremum has the square.
+    /// 50 bisections of a unit interval leave 2⁻⁵¹, 40 ternary steps (2/3)⁴⁰ = 9e-8; the value near an extremum errs by its
+    /// square.
     #[test]
     fn roots_and_extrema_of_a_parabola() {
         for at in [0.2, 0.5, 0.7] {

@@ -1,23 +1,23 @@
-//! Loops compiled for the vector instructions of the machine they run on, and elementary functions without branches, so that
-//! loops over them become vector instructions.
+//! Loops compiled for the vector instructions of the machine at run time, and branch-free elementary functions that
+//! vectorise in loops.
 
 use std::f32::consts::{LN_2, LOG2_E, SQRT_2, TAU};
 
-/// Runs a loop compiled once for every level of vector instructions, in the version this machine has.
+/// Runs a loop compiled for each level of vector instructions, in the version for this machine.
 ///
-/// What the loop calls must be inlined into it (`#[inline(always)]`) to gain. Nothing is reordered or fused, so the
-/// numbers are the same on every machine.
+/// Functions called by the loop must be inlined (`#[inline(always)]`) to benefit. Nothing is reordered or fused, so the
+/// results are the same on every machine.
 #[inline(always)]
 pub(crate) fn vectorized<R>(task: impl FnOnce() -> R) -> R {
     pulp::Arch::new().dispatch(task)
 }
 
-/// eˣ for x up to 700, relative error below 4·10⁻¹⁶·(1 + |x|), and 0 below −700; plain arithmetic, so that it vectorises.
+/// eˣ for x up to 700, with relative error below 4·10⁻¹⁶·(1 + |x|), and 0 below −700; branch-free, so that it vectorises.
 ///
 /// x = n ln 2 + r with |r| ≤ ½ ln 2, and the Taylor series of eʳ to r¹³.
 #[inline(always)]
 pub(crate) fn exp(x: f64) -> f64 {
-    /// Adding it rounds to an integer, which then stands in the low bits.
+    /// Adding it rounds to an integer, which ends up in the low bits.
     const ROUND: f64 = 6_755_399_441_055_744.0;
     /// ln 2 in two parts: the first has 21 trailing zeros, so that n times it is exact.
     const HIGH: f64 = 0.693_147_180_369_123_8;
@@ -67,12 +67,12 @@ pub(crate) fn ln_f32(x: f32) -> f32 {
     n as f32 * LN_2 + q * series
 }
 
-/// Exponential of a number of at most 0; below −87 the smallest normal number.
+/// Exponential of a number of at most 0; the smallest normal number below −87.
 ///
 /// eˣ = 2ⁿ eʳ with |r| ≤ ln2/2 and the Taylor series of eʳ to r⁷.
 #[inline(always)]
 pub(crate) fn exp_f32(x: f32) -> f32 {
-    /// Adding it rounds to an integer, which then stands in the low bits.
+    /// Adding it rounds to an integer, which ends up in the low bits.
     const ROUND: f32 = 12_582_912.0;
     /// ln 2 in two parts: the first has few bits, so that n times it is exact.
     const HIGH: f32 = 0.693_359_4;
@@ -114,7 +114,7 @@ pub(crate) fn cos_sin(turns: u32) -> [f32; 2] {
     ]
 }
 
-/// tanh of a number of at least 0: a series below 0.3, from the exponential above.
+/// tanh of a number of at least 0, by a series below 0.3 and from the exponential beyond.
 #[inline(always)]
 pub(crate) fn tanh_f32(x: f32) -> f32 {
     let x2 = x * x;
@@ -130,7 +130,7 @@ pub(crate) fn tanh_f32(x: f32) -> f32 {
     }
 }
 
-/// 2ˣ for x ≤ 0, relative error below 3e-7; 2⁻¹²⁶ for all below −126. Plain arithmetic, so that it vectorises.
+/// 2ˣ for x ≤ 0, with relative error below 3e-7; 2⁻¹²⁶ below −126. Branch-free, so that it vectorises.
 #[inline(always)]
 pub(crate) fn exp2_f32(x: f32) -> f32 {
     // Adding 1.5·2²³ leaves the nearest integer in the low bits.
@@ -139,7 +139,7 @@ pub(crate) fn exp2_f32(x: f32) -> f32 {
     let rounded = x + ROUND;
     let power = f32::from_bits(rounded.to_bits().wrapping_add(127) << 23);
     let y = (x - (rounded - ROUND)) * LN_2;
-    // Taylor series; |y| ≤ ln 2/2, the first term left out is 1.2e-7.
+    // Taylor series; |y| ≤ ln 2/2, and the first omitted term is 1.2e-7.
     let series = 1.0 / 120.0 + y * (1.0 / 720.0);
     let series = 1.0 / 6.0 + y * (1.0 / 24.0 + y * series);
     power * (1.0 + y * (1.0 + y * (0.5 + y * series)))
@@ -173,7 +173,7 @@ mod tests {
         assert_eq!(sum as i32, 12);
     }
 
-    /// Largest relative difference over points spaced evenly in x or in ln x.
+    /// Largest relative difference over the given points.
     fn worst(
         points: impl Iterator<Item = f32>,
         fast: fn(f32) -> f32,
@@ -187,7 +187,7 @@ mod tests {
     #[test]
     fn exponential_and_tanh_are_right_to_a_few_roundings() {
         let even = (0..200_000).map(|n| n as f32 * -4.3e-4);
-        // The rounding of x itself is part of it for large −x: x·6e-8.
+        // Includes the rounding of x itself for large −x: x·6e-8.
         assert!(worst(even, exp_f32, f64::exp) < 5e-7);
         let spread = (0..200_000).map(|n| (n as f32 * 1.2e-4 - 20.0).exp());
         assert!(worst(spread, tanh_f32, f64::tanh) < 5e-7);
@@ -200,7 +200,7 @@ mod tests {
         for n in 0..200_000 {
             let x = (n as f32 * 8e-4 - 80.0).exp();
             let error = (f64::from(ln_f32(x)) - f64::from(x).ln()).abs();
-            // Absolute near ln 1 = 0 and relative beyond, where n ln 2 is rounded.
+            // Absolute near ln 1 = 0, relative elsewhere, where n ln 2 is rounded.
             assert!(error < 3e-7 * f64::from(x).ln().abs().max(1.0), "{x}");
         }
     }

@@ -1,28 +1,28 @@
-//! What a simulation costs, before it runs.
+//! Estimated cost of a simulation.
 
 use super::work::{Advice, Work};
 use std::fmt;
 
-/// Seconds of a core above which a user should know first: chosen.
+/// Core time \[s\] above which the user should be warned: chosen.
 const HIGH: f64 = 1.0;
 
-/// Estimated cost of a simulation by the fast methods; its text says what to change.
+/// Estimated cost of a simulation by the fast methods; its text gives advice on what to change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cost {
     /// Rows and columns computed, margins included.
     pub computed: [usize; 2],
-    /// Computed pixels for each pixel of the image.
+    /// Computed pixels per pixel of the image.
     pub for_each: f64,
-    /// Time of one core \[s\], good to a factor of three from a tenth of a second on.
+    /// Core time \[s\], within a factor of three above a tenth of a second.
     pub core_seconds: f64,
-    /// Memory \[bytes\]: no more is used, and a third of it or more from 64 MiB on.
+    /// Upper bound on memory \[bytes\]; at least a third of it is used above 64 MiB.
     pub bytes: u64,
-    /// What the most time is for.
+    /// Advice for the costliest part.
     pub(super) advice: Advice,
 }
 
 impl Cost {
-    /// Of an image on a larger raster of computed pixels.
+    /// Cost for an image inside a larger raster of computed pixels.
     pub(super) fn new(computed: [usize; 2], image_pixels: usize, work: &Work) -> Self {
         let pixels = computed[0] as f64 * computed[1] as f64;
         let (core_seconds, advice) = work.seconds();
@@ -35,7 +35,7 @@ impl Cost {
         }
     }
 
-    /// Whether a user should know before the simulation begins.
+    /// Whether the user should be warned before the simulation begins.
     #[must_use]
     pub fn is_high(&self) -> bool {
         self.core_seconds > HIGH
@@ -68,7 +68,7 @@ mod tests {
         Plan::new(&scene).unwrap().cost()
     }
 
-    /// A line of 97 pixels of 0.1 m, displaced by up to kilometres, is computed on all that may reach it.
+    /// A line of 97 pixels of 0.1 m, displaced by up to kilometres, is computed on all pixels that may reach it.
     #[test]
     fn a_thin_image_that_needs_a_wide_sea_says_so() {
         let thin = ["grid.rows=1", "grid.columns=97", "grid.spacing=0.1"];
@@ -84,7 +84,7 @@ mod tests {
         assert!(!cost(&[]).is_high());
     }
 
-    /// Finer pixels than those of the image count.
+    /// Pixels finer than the image's are counted.
     #[test]
     fn oversampling_costs_its_square() {
         let sensor = "radar.sensor=\"sentinel-1-iw\"";

@@ -1,4 +1,4 @@
-//! What leaving each term out would change: estimates by the modulation transfer functions.
+//! Estimated change of the image if a term is left out, by the modulation transfer functions.
 
 use super::terms::Weighed;
 use crate::effects::Weight;
@@ -8,14 +8,14 @@ use crate::prepared::Prepared;
 use crate::scattering::SlopeCovariance;
 use crate::scene::{Scene, Term};
 
-/// An estimate is this many times the linear root mean square: one draw of a random sea may be rougher than its mean,
-/// bunching gathers what changes, and waves of finite height are not quite linear. No proof makes it a bound.
+/// Factor on the linear root mean square: one random sea may be rougher than the mean, bunching concentrates changes, and
+/// waves of finite height are not quite linear. It is an estimate, not a proven bound.
 const SAFETY: f64 = 3.0;
 
-/// What the rounding of `f32` fields may change, whatever is left out: a few times 6e-8 of each of several fields.
+/// Change by the rounding of `f32` fields, whatever is left out: a few times 6e-8 of each of several fields.
 const ROUNDING: f64 = 1e-6;
 
-/// Every term with what it changes, in the order of the data flow.
+/// Every term with its estimated change, in the order of the data flow.
 pub(super) fn weighed(prepared: &Prepared<'_>, amplitudes: &Amplitudes<'_>) -> Vec<Weighed> {
     let (scene, models) = (prepared.scene, &prepared.models);
     let linear = |weight: Weight| Weight {
@@ -64,7 +64,7 @@ fn estimate(term: Term, a: &Amplitudes<'_>) -> f64 {
     }
 }
 
-/// Why a scene has nothing of such a term.
+/// Reason why such a term is absent from a scene.
 fn absent(term: Term, models: &Models, amplitudes: &Amplitudes<'_>) -> Option<&'static str> {
     let first = amplitudes.first;
     let flat = first.is_flat().then_some("there are no resolved waves");
@@ -92,7 +92,7 @@ fn absent(term: Term, models: &Models, amplitudes: &Amplitudes<'_>) -> Option<&'
     }
 }
 
-/// What the impulse response smears away is at most all contrast; the speckle of neighbours is what it adds.
+/// The impulse response smears away at most the whole contrast, and adds correlation of the speckle between neighbours.
 fn response(scene: &Scene, models: &Models, contrast: f64) -> Weight {
     let spacing = models.pixels.image.spacing;
     let correlation = models
@@ -108,7 +108,7 @@ fn response(scene: &Scene, models: &Models, contrast: f64) -> Weight {
     }
 }
 
-/// Speckle multiplies: its share of the speckled image is √(1 + cv²)/√looks, with cv below √3.
+/// Speckle is multiplicative: its share of the speckled image is √(1 + cv²)/√looks, with cv below √3.
 fn speckle(scene: &Scene) -> Weight {
     Weight {
         absent: None,
@@ -145,8 +145,8 @@ mod tests {
         open
     }
 
-    /// One wave of the sea along range and one of the wake along azimuth, both of ω = 1/s, tan θ = 3/4, and numbers of
-    /// their own for all else.
+    /// One wave of the sea along range and one of the wake along azimuth, both with ω = 1/s, tan θ = 3/4, and distinct
+    /// values for everything else.
     fn first(open: &OpenSea) -> FirstOrder<'_> {
         let modulation = ModulationTransfer {
             transfer: Transfer {
@@ -175,7 +175,7 @@ mod tests {
         }
     }
 
-    /// What is left of an estimate without its safety and rounding.
+    /// Estimate without its safety factor and rounding.
     fn of_effect(scene: &[&str], term: Term, amplitudes: &Amplitudes<'_>) -> f64 {
         let scene = Scene::default().with_assignments(scene).unwrap();
         let Prepared {
@@ -195,12 +195,12 @@ mod tests {
         let one_over_e = (-1f64).exp();
         let sea = 0.2 * (0.01 + (0.5 + 0.4 / 3.0 - 0.1f64).powi(2)).sqrt();
         let wake = 0.01 * 8.0 * one_over_e;
-        // Contrast of the image: both and what the specular return changes.
+        // Contrast of the image: both waves and the change by the specular return.
         let c = (sea * sea + wake * wake + 0.09).sqrt();
         let product = (1.0 + c * c).sqrt();
         // Width of a point: 4 m of the pixel and 10/√2 of the resolution.
         let width = 66f64.sqrt();
-        // The rms acceleration toward the radar is √0.040064: the resolution's square grows by 2500 π² of it.
+        // The rms acceleration toward the radar is √0.040064: the squared resolution grows by 2500 π² times its square.
         let acceleration: f64 = 0.04 + 0.64e-4;
         let moving = 1.0 + 25.0 * acceleration;
         let wider = 16.0 + 50.0 * moving;
@@ -209,7 +209,7 @@ mod tests {
         let both = |axis: usize| sea_shift[axis].hypot(wake_shift[axis]) * c;
         let of_sea = (sea + 3.0 * 0.04 * 0.01) * product + sea_shift[0].hypot(sea_shift[1]) * c;
         let of_wake = (wake + 7.0 * 1e-4 * 0.04) * product + wake_shift[0].hypot(wake_shift[1]) * c;
-        // Half as high: a quarter of the second order.
+        // Half the height: a quarter of the second order.
         let of_swell =
             (0.5 * sea + 3.0 * 0.01 * 0.01) * product + 0.5 * sea_shift[0].hypot(sea_shift[1]) * c;
         let open = open();
@@ -282,7 +282,7 @@ mod tests {
         let prepared = Prepared::new(&scene);
         let found = optional(&breaking, Term::Breaking);
         assert!((found / (prepared.effects.breaking.sigma0 / 2.0) - 1.0).abs() < 1e-12);
-        // Together they are three times as much, and what rounding changes; response and speckle stand alone.
+        // All estimates have the safety factor of three and rounding, except response and speckle.
         for Weighed { term, weight } in weighed(&prepared, a) {
             let expected = match term {
                 Term::Sea => 3.0 * of_sea + 1e-6,
@@ -300,7 +300,7 @@ mod tests {
         }
     }
 
-    /// Speckle that neighbours share may be more than the contrast.
+    /// Correlated speckle may exceed the contrast.
     #[test]
     fn a_response_changes_the_contrast_or_the_speckle() {
         let keys = ["radar.range_resolution=40", "radar.azimuth_resolution=40"];
@@ -314,7 +314,7 @@ mod tests {
         }
     }
 
-    /// Where a ship's waves roughen the sea, its specular return is more than that of the sea alone.
+    /// Where a ship's waves roughen the sea, its specular return exceeds that of the sea alone.
     #[test]
     fn rough_places_count_where_they_return_more() {
         let keys = [
@@ -337,7 +337,7 @@ mod tests {
         }
     }
 
-    /// Every term once, and what is absent says so of itself alone.
+    /// Every term appears once, and the reason for an absent term concerns that term.
     #[test]
     fn what_is_absent_is_told_of_its_own_term() {
         let scene = Scene::default();

@@ -1,6 +1,6 @@
-//! What a scene needs, decided before anything is computed: which terms, how wide a margin, how many nodes.
+//! Plan of a simulation, made before anything is computed: terms used, margin, numbers of nodes.
 //!
-//! A plan is complete when it is returned and never changed. What the methods then reach is
+//! A plan is complete when it is returned and never changes. The accuracy achieved by the methods is in
 //! [`Accuracy`](crate::Accuracy).
 
 mod cost;
@@ -29,7 +29,7 @@ use work::{Counts, Work};
 /// The plan of a simulation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// Every term: used or not, an estimate of what leaving it out changes, and why.
+    /// Every term: whether it is used, the estimated change without it, and why.
     pub terms: Vec<PlannedTerm>,
     /// Numbers of pixels, waves and nodes.
     pub sizes: Sizes,
@@ -37,11 +37,11 @@ pub struct Plan {
     pub notes: Vec<String>,
     /// Pixels of the image.
     pub(crate) image_pixels: usize,
-    /// What the stages will do.
+    /// Work of the stages.
     pub(crate) work: Work,
-    /// One a ship.
+    /// One plan per ship.
     pub(crate) wakes: Vec<WakePlan>,
-    /// Mean σ⁰ expected \[1\].
+    /// Expected mean σ⁰ \[1\].
     pub(crate) mean_sigma0: f64,
     /// Variance of the hydrodynamic modulation by the resolved sea \[1\].
     pub(crate) modulation_variance: f64,
@@ -113,9 +113,9 @@ impl Plan {
             memory::check(size, margin, needed, advice.text())?;
             Ok(work)
         };
-        // Before the waves of the wakes are looked at, which takes longer the more pixels there are.
+        // Checked first without the wakes' waves, whose planning takes longer the more pixels there are.
         measured(&[])?;
-        // Each ship's share, so that all of them keep the tolerance together.
+        // Each ship gets a share, so that all together keep the tolerance.
         let share = SHARES.wake_nodes / models.wakes.len().max(1) as f64;
         let wakes = models.wakes.iter().filter(|_| uses(Term::Kelvin));
         let wakes = wakes.map(|wake| {
@@ -146,7 +146,7 @@ impl Plan {
         computed.with_margin(rows, columns)
     }
 
-    /// The same for the mean over all seas: no sea is drawn, and what its waves do is averaged over.
+    /// The same plan for the mean over all seas: no sea is drawn, and the effects of its waves are averaged.
     pub(crate) fn over_all_seas(mut self) -> Self {
         let bunching = self.uses(Term::VelocityBunching);
         for t in &mut self.terms {
@@ -162,7 +162,7 @@ impl Plan {
     }
 }
 
-/// A table of the terms, then the sizes.
+/// Prints a table of the terms, then the sizes.
 impl std::fmt::Display for Plan {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         writeln!(f, "{:<16} {:<5} {:>10}  why", "term", "used", "estimate")?;
@@ -207,7 +207,7 @@ mod tests {
         Plan::new(&scene.with_assignments(keys).unwrap()).unwrap()
     }
 
-    /// One piece up to 2²⁵ pixels; beyond it strips of at most half as many, and none without a row of the image.
+    /// One piece up to 2²⁵ pixels; beyond, strips of at most half as many, each with at least one row of the image.
     #[test]
     fn strips_hold_at_most_half_of_what_one_piece_may() {
         let image = raster(4000, 4000);
@@ -222,8 +222,8 @@ mod tests {
         assert_eq!(strips(&raster(1 << 20, 1 << 10), &raster(3, 9)), 3);
     }
 
-    /// What is counted grows with what makes it: pixels, looks, waves of a turn, nodes of a table, and the distance of a ship with
-    /// none of it.
+    /// The counts grow with their causes: pixels, looks, waves of a turn, nodes of a table; the distance of a ship does not
+    /// matter.
     #[test]
     fn work_is_counted() {
         let base = plan(&[]).cost();
@@ -249,13 +249,13 @@ mod tests {
                 "{far}"
             );
         }
-        // Strips hold a part of the pixels at once.
+        // Strips hold only a part of the pixels at once.
         let large = plan(&["grid.rows=16384", "grid.columns=4096", "model.terms=[]"]);
         assert!(large.sizes.strips > 2 && large.work.at_once < 0.5 * large.work.whole[0]);
         assert!(large.work.computed >= large.work.whole[0]);
     }
 
-    /// A wide turn of a large image has more waves than memory holds: refused, with what to change.
+    /// A wide turn in a large image has more waves than fit in memory: refused, with advice on what to change.
     #[test]
     fn waves_of_a_turn_count_as_memory() {
         let keys = [
@@ -268,12 +268,12 @@ mod tests {
         let scene = Scene::default().with_assignments(&keys).unwrap();
         match Plan::new(&scene) {
             Err(error) => assert!(error.to_string().contains("ship.turn_rate"), "{error}"),
-            // Where there is as much, or the system does not tell.
+            // If there is enough memory, or the system does not report it.
             Ok(plan) => assert!(plan.cost().bytes > 10 << 30),
         }
     }
 
-    /// Only terms that are not used are left out, and speckle is no part of the image before speckle.
+    /// Only unused terms are summed, and speckle is not part of the image before speckle.
     #[test]
     fn what_is_left_out_is_summed_without_speckle() {
         let mut plan = plan(&[]);
@@ -292,7 +292,7 @@ mod tests {
         assert!(!plan.uses(Term::Sea));
     }
 
-    /// The mean over all seas draws none of them, and averages over what they would have done.
+    /// The mean over all seas draws no sea, and averages over the effects of its waves.
     #[test]
     fn the_mean_over_all_seas_draws_no_sea() {
         let rough = [
@@ -317,14 +317,14 @@ mod tests {
             assert!(mean.uses(term), "{term:?}");
         }
         assert_eq!(mean.sizes.sea_lattice, [0, 0]);
-        // Displaced pixels smear: coherence is averaged over where bunching is computed, and only there.
+        // Displaced pixels smear: coherence is averaged over if bunching is computed, and only then.
         for (terms, smeared) in [("[\"sea\", \"bunching\"]", true), ("[\"sea\"]", false)] {
             let of_list = plan(&[&format!("model.terms={terms}")]).over_all_seas();
             assert_eq!(of_list.uses(Term::AzimuthSmear), smeared, "{terms}");
         }
     }
 
-    /// Sizes are those of what is computed: the image and its margins.
+    /// Sizes match the computed pixels: the image and its margins.
     #[test]
     fn sizes_are_those_of_the_image_and_its_margins() {
         let of_ship = plan(&[]);
@@ -346,7 +346,7 @@ mod tests {
         );
     }
 
-    /// The table names each term once, and the sizes in their order.
+    /// The table names each term once, and gives the sizes in order.
     #[test]
     fn the_table_says_what_the_plan_holds() {
         let plan = plan(&[]);
@@ -367,7 +367,7 @@ mod tests {
         );
     }
 
-    /// Ships share what the nodes may be wrong by: their bounds add up to that of one.
+    /// Ships share the error budget of the nodes: their bounds add up to that of one ship.
     #[test]
     fn ships_share_the_tolerance() {
         let one = plan(&["model.terms=all"]);
@@ -381,7 +381,7 @@ mod tests {
         assert!(three.wakes.len() == 3 && (sum / alone - 1.0).abs() < 1e-12);
     }
 
-    /// σ⁰ is what Bragg waves and mirrors return, both near nadir.
+    /// σ⁰ is the sum of Bragg and specular returns, both present near nadir.
     #[test]
     fn the_mean_is_the_sum_of_both_returns() {
         let scene = Scene::default()

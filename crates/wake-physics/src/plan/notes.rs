@@ -1,12 +1,12 @@
-//! What a user should know about a scene, in words.
+//! Notes for the user about a scene.
 
 use crate::prepared::Prepared;
 use crate::scene::Scene;
 
-/// Computed pixels along a side of one of the image above which an impulse response costs more than it shows: chosen.
+/// Computed pixels per side of an image pixel above which an impulse response costs more than it shows: chosen.
 const COARSE_PIXEL: f64 = 8.0;
 
-/// What a user should know.
+/// Collects the notes for a scene.
 pub(super) fn notes(prepared: &Prepared<'_>) -> Vec<String> {
     let (scene, models) = (prepared.scene, &prepared.models);
     let mut notes = Vec::new();

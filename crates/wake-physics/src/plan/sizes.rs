@@ -1,10 +1,10 @@
-//! How much is computed.
+//! Sizes of a simulation.
 
 use crate::raster::Raster;
 use serde::Serialize;
 
-/// Pixels that are computed at once, margins included; more are computed in strips of at most half as many (chosen: about a
-/// gibibyte of fields, and an image of 4096 × 4096 pixels is one strip).
+/// Most pixels computed at once, margins included; larger scenes are computed in strips of at most half as many (chosen:
+/// about a gibibyte of fields, and an image of 4096 × 4096 pixels is one strip).
 const MOST_AT_ONCE: usize = 1 << 25;
 
 /// Numbers of pixels, waves and nodes of a simulation.
@@ -12,7 +12,7 @@ const MOST_AT_ONCE: usize = 1 << 25;
 pub struct Sizes {
     /// Spacing of the computed pixels \[m\]: that of the image or an integer fraction of it.
     pub computed_spacing: f64,
-    /// Strips of rows that are computed one after the other.
+    /// Strips of rows, computed one after the other.
     pub strips: usize,
     /// Rows and columns added on each side of the image.
     pub margin: [usize; 2],

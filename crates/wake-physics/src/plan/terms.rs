@@ -1,4 +1,4 @@
-//! The error budget, and which terms are computed: the choice, given what each would change.
+//! The error budget, and the choice of terms given the change that each would make.
 
 use crate::effects::Weight;
 use crate::scene::{Term, TermRule, Terms};
@@ -6,25 +6,25 @@ use serde::Serialize;
 
 /// Shares of the tolerance \[1\].
 ///
-/// The sources know nothing of each other and their errors rarely have one sign at one pixel; even where they have, the
-/// shares together make up the tolerance. The split follows how cost grows, and was not tuned by measurement: most goes to
-/// the terms left out, which save whole stages, and to the table, whose nodes grow with error^(−1/4) along each axis;
-/// little to nodes, sums and kernels, whose cost grows with the logarithm.
+/// Errors of different sources are independent and rarely have the same sign at a pixel; even if they do, the shares add up
+/// to the tolerance. The split follows how cost grows, and was not tuned by measurement: most goes to the terms left out,
+/// which save whole stages, and to the table, whose nodes grow with error^(−1/4) along each axis; little to nodes, sums and
+/// kernels, whose cost grows with the logarithm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Budget {
     /// Terms left out, by estimate.
     pub(crate) terms: f64,
     /// Nodes of the wake integral.
     pub(crate) wake_nodes: f64,
-    /// Sums of waves on the raster, largest error of a field over its root mean square.
+    /// Sums of waves on the raster, as largest error of a field over its root mean square.
     pub(crate) fields: f64,
-    /// The table of σ⁰, largest error over the mean.
+    /// The table of σ⁰, as largest error over the mean.
     pub(crate) table: f64,
-    /// The kernels of the imaging, mean error over the mean.
+    /// The kernels of the imaging, as mean error over the mean.
     pub(crate) kernels: f64,
 }
 
-/// The one budget there is.
+/// The budget in use.
 pub(crate) const SHARES: Budget = Budget {
     terms: 0.3,
     wake_nodes: 0.1,
@@ -40,24 +40,25 @@ pub struct PlannedTerm {
     pub term: Term,
     /// Whether it is computed.
     pub used: bool,
-    /// Estimated change without the term: three times the root mean square that linear theory gives of the
-    /// change of the intensity before speckle, relative to its mean; for speckle itself, of the speckled image.
-    /// 0 where the scene has nothing of it. No estimate: the image is not linear.
+    /// Estimated change without the term: three times the linear-theory root mean square change of the intensity before
+    /// speckle, relative to its mean; for speckle itself, of the speckled image. 0 where the scene lacks the term. An
+    /// estimate, not a bound: the image is not linear.
     pub estimate: f64,
-    /// Why, in words.
+    /// Reason, in words.
     pub why: String,
 }
 
-/// A term with what it changes.
+/// A term with its estimated change.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Weighed {
     pub(crate) term: Term,
     pub(crate) weight: Weight,
 }
 
-/// Chooses terms. By rule "needed" terms are left out from the smallest estimate up, as long as the sum of the
-/// estimates left out stays within their share of the tolerance; speckle, which is no part of the image before speckle, has
-/// the tolerance for itself. The impulse response decides on which pixels all is computed: it is used where it is there.
+/// Chooses terms. Under the rule "needed", terms are left out in ascending order of estimate, as long as the sum of the
+/// estimates left out stays within their share of the tolerance; speckle, which is not part of the image before speckle, is
+/// compared with the whole tolerance. The impulse response determines the computed pixels: it is used whenever it is
+/// present.
 pub(crate) fn choose(effects: &[Weighed], terms: &Terms, tolerance: f64) -> Vec<PlannedTerm> {
     let alone = [Term::Speckle, Term::ImpulseResponse];
     let mut order: Vec<&Weighed> = effects
@@ -114,7 +115,7 @@ fn planned(effect: &Weighed, terms: &Terms, below_budget: bool) -> PlannedTerm {
 mod tests {
     use super::*;
 
-    /// All shares, none forgotten (a new one does not compile here), are positive and no more than the tolerance.
+    /// All shares are positive and sum to at most the tolerance (a new share does not compile here unless added).
     #[test]
     fn the_shares_are_at_most_the_tolerance() {
         let Budget {
@@ -154,7 +155,7 @@ mod tests {
             effect(Term::VelocityBunching, 1.0),
         ];
         let needed = Terms::Rule(TermRule::Needed);
-        // 0.1 + 0.15 fit into 0.3 of 1; with 0.3 it would be 0.55.
+        // 0.1 + 0.15 fit within 0.3; another 0.3 would make 0.55.
         assert_eq!(used(&effects, &needed), [true, false, false, true]);
         assert_eq!(used(&effects, &Terms::Rule(TermRule::All)), [true; 4]);
         let list = Terms::List(vec![Term::Kelvin]);

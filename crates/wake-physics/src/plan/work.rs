@@ -1,4 +1,4 @@
-//! What the stages of a simulation will do, counted before they do it: operations, the time they take, and memory.
+//! Work of the stages of a simulation, counted in advance: operations, the time they take, and memory.
 
 use super::sizes::Sizes;
 use super::terms::SHARES;
@@ -11,29 +11,29 @@ use crate::sar::Imaging;
 use crate::scattering::{BackscatterTable, SlopeCovariance};
 use crate::scene::{Scene, Term};
 
-/// Tolerance below which sums of waves are transformed in double precision: of the order of `f32`'s rounding over the share
-/// that a sum has.
+/// Tolerance below which sums of waves are transformed in double precision: about the rounding of `f32` over a sum's share
+/// of the tolerance.
 const PRECISE: f64 = 5e-4;
 
 /// Accelerations of the fastest pixels over their standard deviation, and columns that a thread sums at once.
 const FARTHEST_MOVED: f64 = 5.0;
 const BLOCK: usize = 64;
 
-/// What makes a scene cheaper.
+/// Advice on what makes a scene cheaper.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Advice {
-    /// Most is for pixels.
+    /// Pixels dominate.
     Pixels,
-    /// Most is for the waves of ships that turn.
+    /// Waves of turning ships dominate.
     Turn,
-    /// Most is for looks through an impulse response.
+    /// Looks through an impulse response dominate.
     Looks,
-    /// Most is for the table of σ⁰.
+    /// The table of σ⁰ dominates.
     Tolerance,
 }
 
 impl Advice {
-    /// What to change, beginning with a verb.
+    /// Advice, beginning with a verb.
     pub(crate) fn text(self) -> &'static str {
         match self {
             Self::Pixels => {
@@ -48,109 +48,110 @@ impl Advice {
     }
 }
 
-/// Counts of what the stages work on.
+/// Amounts of work of the stages.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Work {
-    /// Pixels computed, those of overlapping strips once for each.
+    /// Pixels computed, with those of overlapping strips counted repeatedly.
     pub(crate) computed: f64,
     /// Pixels in memory at once, computed or as sources.
     pub(crate) at_once: f64,
-    /// Pixels that are kept as a whole while strips are computed: computed, and of the image.
+    /// Pixels kept for the whole image while strips are computed: computed pixels and image pixels.
     pub(crate) whole: [f64; 2],
     /// Pixels of the image.
     pub(crate) image: f64,
     /// Points of the periodic lattice of the sea.
     pub(crate) lattice: f64,
-    /// Fields by non-uniform FFTs: the swell's and the wakes', as many as have waves.
+    /// Sums by non-uniform FFTs: one for the swell and one for each wake that has waves.
     pub(crate) sums: f64,
-    /// Whether they are asked for more exactly than single precision allows.
+    /// Whether these need more than single precision.
     pub(crate) precise: bool,
-    /// Ships with a dark line, with edges, and with waves that pixels do not carry.
+    /// Ships with a dark line, with bright edges, and with waves too short for the pixels.
     pub(crate) ships: [f64; 3],
-    /// Ships among those of the first two that turn: each pixel is looked for on a circle.
+    /// Turning ships among those with a dark line or edges: each pixel is located on a circle.
     pub(crate) turning: f64,
-    /// Slicks and gusts.
+    /// Fields of slicks and gusts.
     pub(crate) patterns: f64,
-    /// Ranges of pixels that the return of one is spread over.
+    /// Pixels over which the return of one pixel is spread.
     pub(crate) taps: f64,
-    /// Nodes of the table of σ⁰, and pixels steeper than it covers.
+    /// Nodes of the table of σ⁰, and pixels steeper than its range.
     pub(crate) table: f64,
     pub(crate) steep: f64,
-    /// Values of the image that is summed up, spread as far as any pixel is.
+    /// Values of the image buffer, extended by the largest spread of any pixel.
     pub(crate) summed: f64,
-    /// Pixels that an impulse response looks at, and looks.
+    /// Source pixels of an impulse response, and looks.
     pub(crate) sources: f64,
     pub(crate) looks: f64,
-    /// Waves of ships that turn.
+    /// Waves of turning ships.
     pub(crate) rings: RingWork,
 }
 
-/// Seconds of a core for each of what is counted, measured on x86-64 with AVX-512 at 2 to 3 GHz.
+/// Core seconds per unit of work, measured on x86-64 with AVX-512 at 2 to 3 GHz.
 mod seconds {
-    /// First-order theory, plan and labels of a scene; what a ship adds to them.
+    /// First-order theory, plan and labels of a scene; additional time per ship.
     pub(super) const SCENE: f64 = 0.004;
     pub(super) const SHIP: f64 = 0.02;
-    /// A pixel: σ⁰ and the fields; what one tap of the imaging adds.
+    /// A pixel: σ⁰ and the fields; additional time per tap of the imaging.
     pub(super) const PIXEL: f64 = 6e-8;
     pub(super) const TAP: f64 = 3e-10;
     /// A pixel steeper than the table of σ⁰.
     pub(super) const STEEP: f64 = 2e-4;
-    /// A point of the sea's lattice, all fields.
+    /// A point of the sea's lattice, for all fields.
     pub(super) const LATTICE: f64 = 5e-8;
-    /// A pixel of the fields of one sum of waves; the same in double precision.
+    /// A pixel of the fields of one sum of waves, in single and in double precision.
     pub(super) const SUM: [f64; 2] = [6.5e-8, 1e-7];
-    /// A pixel of a ship's dark line, its edges, its short waves; of one that turns besides.
+    /// A pixel of a ship's dark line, of its edges, of its short waves; additional time if the ship turns.
     pub(super) const SHIPS: [f64; 3] = [1.5e-8, 3e-8, 8e-8];
     pub(super) const TURNING: f64 = 1e-7;
     /// A pixel of slicks or gusts.
     pub(super) const PATTERN: f64 = 1.5e-8;
     /// A node of the table.
     pub(super) const NODE: f64 = 1e-7;
-    /// A source of one look, and a pixel of the image that has speckle of its own.
+    /// A source of one look, and an image pixel with independent speckle.
     pub(super) const LOOK: f64 = 6e-9;
     pub(super) const SPECKLE: f64 = 1e-8;
-    /// A wave of a ring, one that is kept, a Bessel function.
+    /// A wave of a ring, a kept wave, a Bessel function.
     pub(super) const RING: f64 = 3e-8;
     pub(super) const KEPT: f64 = 1.8e-6;
     pub(super) const BESSEL: f64 = 1e-7;
 }
 
-/// Bytes for each of what is counted.
+/// Bytes per unit of work.
 mod bytes {
-    /// Whatever the scene: tables of formulas, plans of small FFTs, threads.
+    /// Any scene: tables of formulas, plans of small FFTs, threads.
     pub(super) const SCENE: f64 = 16e6;
-    /// A pixel at once; what a sum of waves adds, in single and in double precision; short waves; slicks and gusts.
+    /// A pixel at once; additional bytes for a sum of waves in single and in double precision, short waves, slicks and
+    /// gusts.
     pub(super) const PIXEL: f64 = 60.0;
     pub(super) const SUM: [f64; 2] = [60.0, 110.0];
     pub(super) const SHORT: f64 = 12.0;
     pub(super) const PATTERN: f64 = 4.0;
     /// A point of the sea's lattice: amplitudes and half a spectrum.
     pub(super) const LATTICE: f64 = 20.0;
-    /// A value of the image that is summed up.
+    /// A value of the image buffer.
     pub(super) const SUMMED: f64 = 8.0;
     /// A source of an impulse response.
     pub(super) const SOURCE: f64 = 24.0;
-    /// A computed pixel and one of the image while others are computed in strips.
+    /// A computed pixel and an image pixel while other pixels are computed in strips.
     pub(super) const WHOLE: [f64; 2] = [8.0, 52.0];
-    /// A node of the table while it is made.
+    /// A node of the table during its construction.
     pub(super) const NODE: f64 = 16.0;
-    /// A wave of a ring, one that is kept, and one of those spread at once.
+    /// A wave of a ring, a kept wave, and a wave spread at once in single and in double precision.
     pub(super) const RING: f64 = 18.0;
     pub(super) const KEPT: f64 = 40.0;
     pub(super) const SPREAD: [f64; 2] = [560.0, 900.0];
 }
 
-/// What work is counted from.
+/// Inputs from which the work is counted.
 pub(super) struct Counts<'a> {
     pub(super) prepared: &'a Prepared<'a>,
     pub(super) first: &'a FirstOrder<'a>,
     pub(super) sizes: &'a Sizes,
-    /// The waves of the ships, once they are planned.
+    /// The waves of the ships, after they have been planned.
     pub(super) wakes: &'a [WakePlan],
 }
 
 impl Work {
-    /// Counts the work of a scene by its plan.
+    /// Counts the work of a planned scene.
     pub(super) fn of(counts: &Counts<'_>, uses: impl Fn(Term) -> bool) -> Self {
         let Counts {
             prepared,
@@ -189,7 +190,7 @@ impl Work {
         let waves = wakes.iter().filter(|wake| wake.nodes() > 0).count();
         let swell = uses(Term::Swell) && models.swell.is_some();
         let tolerance = scene.model.tolerance;
-        // Transverse and divergent waves, both as steep as they can be.
+        // Transverse and divergent waves, both at their largest steepness.
         let short_waves = when(uses(Term::SubpixelWake)) * 2.0 * LARGEST_SLOPE_VARIANCE;
         let leans = if uses(Term::RangeBunching) { 2.0 } else { 1.0 };
         let backscatter = models.backscatter(uses(Term::TiltAverage), false);
@@ -245,7 +246,7 @@ impl Work {
                 .iter()
                 .map(WakePlan::ring_work)
                 .fold(RingWork::default(), |sum, one| RingWork {
-                    // One ship after the other.
+                    // Ships are processed one after the other.
                     nodes: sum.nodes + one.nodes,
                     most_nodes: sum.most_nodes.max(one.most_nodes),
                     kept: sum.kept + one.kept,
@@ -255,7 +256,7 @@ impl Work {
         }
     }
 
-    /// Seconds of a core, and what to change.
+    /// Core seconds, and advice on what to change.
     pub(super) fn seconds(&self) -> (f64, Advice) {
         use seconds::*;
         let per_pixel = PIXEL
@@ -281,7 +282,7 @@ impl Work {
         (sum, most.map_or(Advice::Pixels, |part| part.1))
     }
 
-    /// Bytes at once, at most, and what to change.
+    /// Upper bound on bytes held at once, and advice on what to change.
     pub(super) fn bytes(&self) -> (u64, Advice) {
         use bytes::*;
         let precise = usize::from(self.precise);
@@ -314,7 +315,7 @@ impl Work {
     }
 }
 
-/// Pixels over which the imaging spreads one of an acceleration [m/s²].
+/// Pixels over which the imaging spreads a pixel of given acceleration [m/s²].
 fn taps(models: &Models, coherent: bool, acceleration: f64, tolerance: f64) -> f64 {
     let imaging = Imaging {
         range_to_velocity: models.range_to_velocity,
@@ -328,7 +329,7 @@ fn taps(models: &Models, coherent: bool, acceleration: f64, tolerance: f64) -> f
     imaging.taps(acceleration, models.pixels.computed.spacing, tolerance)
 }
 
-/// Looks that are drawn through an impulse response.
+/// Looks simulated through an impulse response.
 fn looks(scene: &Scene, models: &Models, speckled: bool) -> f64 {
     let Some(response) = models.response.filter(|_| speckled) else {
         return 0.0;

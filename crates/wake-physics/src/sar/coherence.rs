@@ -1,12 +1,12 @@
-//! How sharply a moving sea is imaged in azimuth.
+//! Azimuth resolution of a moving sea.
 //!
-//! A resolution ρ stands for the point response in power
+//! A resolution ρ denotes the point response in power
 //!
 //! ```text
 //! exp(−(π/ρ)² y²)        standard deviation ρ/(√2 π)
 //! ```
 //!
-//! which is what an aperture of Gaussian weight exp(−2t²/T²) in amplitude and T = λR/(2Vρ) gives.
+//! which is the response of an aperture with the Gaussian weight exp(−2t²/T²) in amplitude and T = λR/(2Vρ).
 
 use std::f64::consts::{FRAC_PI_2, PI, SQRT_2};
 
@@ -23,7 +23,7 @@ pub fn integration_time(wavelength: f64, range_to_velocity: f64, resolution: f64
     wavelength * range_to_velocity / (2.0 * resolution)
 }
 
-/// Time in which the echo's field correlation falls to 1/e because unresolved waves move.
+/// Time in which the field correlation of the echo falls to 1/e because of unresolved moving waves.
 ///
 /// ```text
 /// C(t) = ⟨exp(2 i k_e u t)⟩ = exp(−2 k_e² σ_u² t²) = exp(−(t/τ_c)²)
@@ -31,30 +31,30 @@ pub fn integration_time(wavelength: f64, range_to_velocity: f64, resolution: f64
 /// ```
 ///
 /// - `wavelength` λ = 2π/`k_e` \[m\], of the radar
-/// - `velocity_deviation` `σ_u` [m/s], standard deviation of the line-of-sight velocity of the waves shorter
-///   than the pixels resolve, at least 0
+/// - `velocity_deviation` `σ_u` [m/s], standard deviation of the line-of-sight velocity of the waves too short for the
+///   pixels, at least 0
 /// - returns `τ_c` \[s\]; infinite at `σ_u` = 0
 ///
-/// With this definition the lost resolution is what velocity bunching by the unresolved waves would smear:
-/// `λR/(2Vτ_c)` has the standard deviation (R/V)`σ_u`.
+/// With this definition the lost resolution equals the smear by velocity bunching of the unresolved waves: `λR/(2Vτ_c)` has
+/// the standard deviation (R/V)`σ_u`.
 ///
 /// # Validity
 ///
-/// Waves with periods longer than `τ_c` and Gaussian velocities. Other definitions of `τ_c` give other numbers:
-/// for Pierson–Moskowitz waves this is 1.74 λ/U/√erf(2.69 ρ/U²), where a prefactor near 3 is also in use.
+/// Waves with periods longer than `τ_c` and Gaussian velocities. Other definitions of `τ_c` differ in the prefactor: for
+/// Pierson–Moskowitz waves this one is 1.74 λ/U/√erf(2.69 ρ/U²); a prefactor near 3 is also in use.
 #[must_use]
 pub fn coherence_time(wavelength: f64, velocity_deviation: f64) -> f64 {
     wavelength / (2.0 * SQRT_2 * PI * velocity_deviation)
 }
 
-/// Wavelength in azimuth below which random motion erases waves from the image.
+/// Azimuth wavelength below which random motion erases waves from the image.
 ///
 /// ```text
 /// λ_c = 2π (R/V) σ_u
 /// ```
 ///
 /// - `range_to_velocity` R/V \[s\]; `velocity_deviation` `σ_u` [m/s] of the line-of-sight velocity
-/// - returns `λ_c` \[m\]: the power of waves with `k_y` = 2π/`λ_c` is damped by 1/e, see [`cutoff_transfer`]
+/// - returns `λ_c` \[m\]: the power of waves with `k_y` = 2π/`λ_c` is reduced to 1/e, see [`cutoff_transfer`]
 ///
 /// # References
 ///
@@ -71,7 +71,7 @@ pub fn azimuth_cutoff(range_to_velocity: f64, velocity_deviation: f64) -> f64 {
 /// ```
 ///
 /// - `wavenumber` `k_y` [rad/m]; `range_to_velocity` R/V \[s\]; `velocity_deviation` `σ_u` [m/s]
-/// - returns a factor in power, 0 to 1; its root is that of the amplitude
+/// - returns a factor on the power, 0 to 1; its square root applies to the amplitude
 #[must_use]
 pub fn cutoff_transfer(wavenumber: f64, range_to_velocity: f64, velocity_deviation: f64) -> f64 {
     (-(wavenumber * range_to_velocity * velocity_deviation).powi(2)).exp()
@@ -83,9 +83,9 @@ pub fn cutoff_transfer(wavenumber: f64, range_to_velocity: f64, velocity_deviati
 /// ρ'² = (N ρ_a)² + (λR/(2Vτ_c))² + (π/2 · T (R/V) a_r)²,      T = λR/(2Vρ_a)
 /// ```
 ///
-/// The first two are `N ρ_a √(1 + T²/(N² τ_c²))` without a division by N `τ_c`. The looks share the aperture: one
-/// of N looks lasts T/N and has the resolution N `ρ_a`. Acceleration `a_r` moves the looks against each other as
-/// much as it defocuses one long look, so that part knows the whole T and not N.
+/// The first two are `N ρ_a √(1 + T²/(N² τ_c²))`, written without a division by N `τ_c`. The looks share the aperture: each
+/// of N looks lasts T/N and has the resolution N `ρ_a`. Acceleration `a_r` displaces the looks relative to each other by as
+/// much as it defocuses one long look, so this part depends on the whole T and not on N.
 ///
 /// # References
 ///
@@ -101,7 +101,7 @@ pub struct AzimuthResolution {
 }
 
 impl AzimuthResolution {
-    /// The resolution of a sea at rest: N looks of single-look resolution `ρ_a` \[m\].
+    /// Resolution of a sea at rest: N looks of single-look resolution `ρ_a` \[m\].
     #[must_use]
     pub fn at_rest(resolution: f64, looks: u32) -> Self {
         Self {
@@ -111,7 +111,7 @@ impl AzimuthResolution {
         }
     }
 
-    /// The same radar over a sea that moves.
+    /// Resolution of a moving sea.
     ///
     /// - `wavelength` λ \[m\], of the radar; `range_to_velocity` R/V \[s\]
     /// - `resolution` `ρ_a` \[m\], single look, above 0; `looks` N
@@ -132,7 +132,7 @@ impl AzimuthResolution {
         }
     }
 
-    /// The resolution ρ' \[m\] where the acceleration toward the radar is `a_r` [m/s²].
+    /// Resolution ρ' \[m\] where the acceleration toward the radar is `a_r` [m/s²].
     #[must_use]
     pub fn at(&self, radial_acceleration: f64) -> f64 {
         let defocus = self.defocus * radial_acceleration;
@@ -147,15 +147,15 @@ mod tests {
 
     const WAVELENGTH: f64 = 0.0312;
 
-    /// Midpoint rule; the integrands below are smooth.
+    /// Integral by the midpoint rule; the integrands below are smooth.
     fn integral(from: f64, to: f64, f: impl Fn(f64) -> f64) -> f64 {
         let n = 20_000;
         let h = (to - from) / f64::from(n);
         (0..n).map(|i| h * f(from + (f64::from(i) + 0.5) * h)).sum()
     }
 
-    /// The closed form of the literature, with the prefactor of our definition, against a numerical integral
-    /// over the Pierson–Moskowitz spectrum of the waves with k > π/ρ.
+    /// The closed form of the literature, with the prefactor of this definition, against a numerical integral over the
+    /// Pierson–Moskowitz spectrum of the waves with k > π/ρ.
     #[test]
     fn pierson_moskowitz_closed_form() {
         let (alpha, beta) = (8.1e-3, 0.74);
@@ -174,8 +174,8 @@ mod tests {
         }
     }
 
-    /// The response in power of a Gaussian aperture, exp(−2t²/T²) in amplitude, to a field of correlation
-    /// exp(−(t/τ)²) and acceleration a: a Fourier integral, done numerically, against the closed forms.
+    /// The response in power of a Gaussian aperture, exp(−2t²/T²) in amplitude, to a field of correlation exp(−(t/τ)²) and
+    /// acceleration a: a numerical Fourier integral against the closed forms.
     #[test]
     fn resolution_is_that_of_the_focused_aperture() {
         let (ratio, single, acceleration, deviation) = (78.0, 3.0, 0.12, 0.01);
@@ -190,14 +190,14 @@ mod tests {
             (0.0, tau, resolution.at(0.0)),
             (acceleration, tau, resolution.at(acceleration)),
         ] {
-            // Ambiguity function in the lag d: the acceleration's phase 2πa/λ·2·t·d integrated over t.
+            // Ambiguity function at the lag d: the phase due to acceleration, 2πa/λ·2·t·d, integrated over t.
             let chirp = 2.0 * PI * a / WAVELENGTH;
             let lag = |d: f64| {
                 let aperture = (-(d / span).powi(2)).exp();
                 let phase = (-(chirp * d * span).powi(2) / 4.0).exp();
                 aperture * phase * (-(d / tau).powi(2)).exp()
             };
-            // Doppler of an azimuth y is 2y/(λR/V); the response must be exp(−(π y/ρ')²).
+            // The Doppler frequency of an azimuth y is 2y/(λR/V); the response must be exp(−(π y/ρ')²).
             let power = |y: f64| {
                 let doppler = 4.0 * PI * y / (WAVELENGTH * ratio);
                 integral(-4.0 * span, 4.0 * span, |d| lag(d) * (doppler * d).cos())
@@ -238,7 +238,7 @@ mod tests {
         let cutoff = azimuth_cutoff(78.0, 0.4);
         let left = cutoff_transfer(2.0 * PI / cutoff, 78.0, 0.4);
         assert!((left - (-1f64).exp()).abs() < 1e-14);
-        // The smear of unresolved waves is bunching by them: same standard deviation (R/V)σ_u.
+        // The smear by unresolved waves equals bunching by them: same standard deviation (R/V)σ_u.
         let coherence = AzimuthResolution::of_moving_sea(WAVELENGTH, 78.0, 3.0, 1, 0.4).coherence;
         assert!((coherence / (SQRT_2 * PI) - 78.0 * 0.4).abs() < 1e-12);
         let tau = coherence_time(WAVELENGTH, 0.4);

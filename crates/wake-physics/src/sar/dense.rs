@@ -1,4 +1,4 @@
-//! The oracle of velocity bunching: every pixel from all sources, exactly, in double precision; O(N³).
+//! Reference for velocity bunching: every pixel is summed over all sources, exactly, in double precision; O(N³).
 
 use crate::raster::{Field, Raster};
 use crate::sar::geometry::{azimuth_displacement, layover};
@@ -6,24 +6,24 @@ use crate::sar::imaging::{Imaging, Sources};
 use rayon::prelude::*;
 use std::f64::consts::{PI, SQRT_2};
 
-/// Smallest standard deviation of a response in azimuth \[pixels\], the convention of the fast sum too.
+/// Smallest standard deviation of an azimuth response \[pixels\], as in the fast sum.
 const SMALLEST_DEVIATION: f64 = 0.5;
 
 /// The bunching integral as a sum over all sources, ready to be evaluated at any pixel.
 ///
-/// Places in metres from the formulas of the geometry, widths from the resolution: nothing of it is shared with
-/// [`Imaging::image`]. No cut-off, no steps, no tolerance.
+/// Positions are computed in metres from the formulas of the geometry, and widths from the resolution, sharing nothing with
+/// [`Imaging::image`]. There is no cut-off, no step and no tolerance.
 #[derive(Debug)]
 pub struct DirectImage {
     raster: Raster,
-    /// For every column of the image, the sources that are imaged in it.
+    /// For every column of the image, the sources imaged in it.
     columns: Vec<Vec<Source>>,
 }
 
-/// One source as one column sees it.
+/// A source as it contributes to one column.
 #[derive(Debug, Clone, Copy)]
 struct Source {
-    /// Row at which it is imaged, with fraction.
+    /// Row at which it is imaged, fractional.
     row: f64,
     /// 1/(2 variance) [1/row²].
     rate: f64,
@@ -32,7 +32,7 @@ struct Source {
 }
 
 impl DirectImage {
-    /// Places all sources.
+    /// Computes where all sources are imaged.
     ///
     /// # Panics
     ///
@@ -60,7 +60,7 @@ impl DirectImage {
         }
     }
 
-    /// The intensity of one pixel.
+    /// Intensity of one pixel.
     ///
     /// # Panics
     ///
@@ -71,20 +71,20 @@ impl DirectImage {
         self.columns[column].iter().map(weight).sum()
     }
 
-    /// The whole image.
+    /// Computes the whole image.
     #[must_use]
     pub fn image(&self) -> Field {
         Field::from_fn(&self.raster, |i, j| self.at(i, j) as f32)
     }
 }
 
-/// Standard deviations of a response beyond which a source does not reach a pixel: exp(−7²/2) = 2e-11 of its peak.
+/// Standard deviations of a response beyond which a source is ignored: exp(−7²/2) = 2e-11 of its peak.
 const REACH: f64 = 7.0;
-/// Pixels by which sources may lie elsewhere than their fields say: ten thousand times what a field that is exact to
-/// 1e-6 of its root mean square displaces them.
+/// Allowed error of source positions due to errors of their fields \[pixels\]: ten thousand times the displacement by a
+/// field error of 1e-6 of its root mean square.
 const SLACK: f64 = 0.01;
 
-/// The source pixels `[row, column]` that reach some of the given pixels of the image, each once.
+/// The source pixels `[row, column]` that reach any of the given pixels of the image, each once.
 ///
 /// # Panics
 ///
@@ -111,7 +111,7 @@ pub(crate) fn reaching(
         .collect()
 }
 
-/// Column (with fraction) and response of the source pixel `[i, j]`.
+/// Column (fractional) and response of the source pixel `[i, j]`.
 fn place(
     imaging: &Imaging,
     sources: &Sources<'_>,
@@ -156,7 +156,7 @@ mod tests {
                 let sum: f64 = (-200..200)
                     .map(|m| (-(f64::from(m) - t).powi(2) / (2.0 * variance)).exp())
                     .sum();
-                // The first term left out is exp(−2π²·9/4) = 5e-20.
+                // The first omitted term is exp(−2π²·9/4) = 5e-20.
                 assert!((weight_sum(t, variance) / sum - 1.0).abs() < 1e-14);
             }
         }

@@ -1,20 +1,20 @@
-//! The echo of a ship on pixels with speckle of their own, where no impulse response images it.
+//! Echo of a ship on pixels with independent speckle, used if no impulse response images it.
 
 use crate::raster::{Field, Raster};
 use crate::sar::dense::weight_sum;
 use crate::sar::impulse::PointTarget;
 use std::f64::consts::PI;
 
-/// Adds points to an image before speckle: Gaussian in azimuth, shared linearly by two columns in range.
+/// Adds points to an image before speckle: Gaussian in azimuth, shared linearly between two columns in range.
 ///
-/// - `intensity`: the image, `[rows, columns]` of `raster`, linear in the unit of σ⁰
-/// - `resolution` \[m\]: of the radar in azimuth, for points at rest; in range it is the pixel
+/// - `intensity`: the image, `[rows, columns]` of `raster`, linear in units of σ⁰
+/// - `resolution` \[m\]: azimuth resolution of the radar for points at rest; in range it is the pixel
 ///
-/// The sum added is the points' cross section / pixel area, less what falls outside the image.
+/// The added sum is the points' cross section over the pixel area, minus the part outside the image.
 ///
 /// # Panics
 ///
-/// If the intensity is not of the raster's size.
+/// If the intensity does not match the raster in size.
 pub(crate) fn add_points(
     intensity: &mut Field,
     raster: &Raster,
@@ -40,7 +40,7 @@ pub(crate) fn add_points(
     }
 }
 
-/// Adds one point at (row, column), with fractions: Gaussian in azimuth, linear weights in range.
+/// Adds one point at a fractional (row, column): Gaussian in azimuth, linear weights in range.
 fn add_point(image: &mut Field, [row, column]: [f64; 2], power: f64, variance: f64) {
     let sum = weight_sum(row, variance);
     // exp(−18) of the peak is below the rounding of f32.
@@ -64,7 +64,7 @@ mod tests {
     use super::*;
     use crate::sar::geometry::{azimuth_displacement, ship_radial_velocity};
 
-    /// Sum, centre (x, y) and standard deviations of what points add \[m\].
+    /// Sum, centre (x, y) and standard deviations \[m\] of the intensity added by points.
     fn moments(points: &[PointTarget], raster: &Raster) -> (f64, [f64; 2], [f64; 2]) {
         let mut image = Field::constant(raster, 0.0);
         add_points(&mut image, raster, points, 3.0);
@@ -100,16 +100,16 @@ mod tests {
             let velocity = ship_radial_velocity(5.0, heading, 32f64.to_radians());
             let shift = azimuth_displacement(78.0, velocity);
             let (sum, [x, y], _) = moments(&points(shift), &raster);
-            // Rounding of f32 sums; the centre of a sampled Gaussian of half a pixel lies within 0.03 pixel.
+            // Rounding of f32 sums; the centre of a sampled Gaussian half a pixel wide lies within 0.03 pixel.
             assert!((sum * 6.25 / 5e5 - 1.0).abs() < 1e-5);
             assert!((x - (0.2 * 17.3 + 0.8 * 31.1)).abs() < 1e-2 && (y - shift).abs() < 0.1);
         }
-        // Toward 90 is away from the radar: smaller y. Toward 270: larger.
+        // Heading 90 is away from the radar: smaller y. Heading 270: larger.
         let away = ship_radial_velocity(5.0, 90.0, 0.5);
         assert!(azimuth_displacement(78.0, away) < -100.0);
     }
 
-    /// A point is as wide as the radar resolves in azimuth, ρ/(√2 π), at least half a pixel.
+    /// A point is as wide as the radar's azimuth resolution, ρ/(√2 π), and at least half a pixel.
     #[test]
     fn a_point_is_as_sharp_as_the_radar() {
         let raster = Raster::image(100, 90, 0.5);

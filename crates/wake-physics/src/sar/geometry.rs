@@ -1,4 +1,4 @@
-//! Where the radar sees a point: line of sight, azimuth displacement, layover.
+//! Imaging geometry of a point: line of sight, azimuth displacement, layover.
 
 pub use crate::track::direction;
 
@@ -16,20 +16,20 @@ pub fn radial_velocity(velocity_x: f64, velocity_z: f64, incidence: f64) -> f64 
     velocity_z * incidence.cos() - velocity_x * incidence.sin()
 }
 
-/// Velocity toward the radar of a ship.
+/// Velocity of a ship toward the radar.
 ///
 /// ```text
 /// u_r = −U sin(heading) sin θ
 /// ```
 ///
-/// - `speed` U [m/s]; `heading` where it moves to [deg clockwise from azimuth]; `incidence` θ \[rad\]
+/// - `speed` U [m/s]; `heading` of its motion [deg clockwise from azimuth]; `incidence` θ \[rad\]
 /// - returns `u_r` [m/s], negative for a ship that moves away from the radar
 #[must_use]
 pub fn ship_radial_velocity(speed: f64, heading: f64, incidence: f64) -> f64 {
     radial_velocity(speed * direction(heading)[0], 0.0, incidence)
 }
 
-/// Azimuth at which a moving point is imaged, less its true azimuth.
+/// Azimuth displacement of a moving point: imaged minus true azimuth.
 ///
 /// ```text
 /// Δy = (R/V) u_r
@@ -47,7 +47,7 @@ pub fn azimuth_displacement(range_to_velocity: f64, radial_velocity: f64) -> f64
     range_to_velocity * radial_velocity
 }
 
-/// Ground range at which an elevated point is imaged, less its true ground range.
+/// Layover of an elevated point: imaged minus true ground range.
 ///
 /// ```text
 /// Δx = −ζ cot θ
@@ -86,7 +86,7 @@ mod tests {
         // A point that rises, or moves toward the radar (−x), approaches it.
         assert!(radial_velocity(0.0, 1.0, incidence) > 0.0);
         assert!(radial_velocity(-1.0, 0.0, incidence) > 0.0);
-        // Motion along the line of sight (sin θ, −cos θ), away from the radar, counts in full.
+        // Motion along the line of sight (sin θ, −cos θ), away from the radar, counts fully.
         let (sin, cos) = f64::sin_cos(incidence);
         assert!((radial_velocity(sin, -cos, incidence) + 1.0).abs() < 1e-15);
         assert!(radial_velocity(cos, sin, incidence).abs() < 1e-15);

@@ -1,4 +1,4 @@
-//! The halo of a ship: power that returns from around the hull, and not from one of its points.
+//! Halo of a ship: power returned from around the hull rather than from one of its points.
 //!
 //! ```text
 //! I(r) = σ_h / (2π √det M) · (1 + rᵀ M⁻¹ r)^{−3/2}
@@ -8,14 +8,14 @@
 //! The hull's second moments are L²/12 along and B²/12 across the heading, ρ is the resolution of each axis. The integral over the
 //! plane is the cross section `σ_h`, and the share inside the contour rᵀ M⁻¹ r = q² is 1 − (1 + q²)^{−1/2}.
 //!
-//! Such power comes by way of the sea and off the ship twice, from spray and white water about the hull, and from what a processor
-//! leaves out of focus. Its form is chosen: the power law of the far sidelobes, r^{−3} over the area as 1/x² along a line, continued
-//! to a finite centre.
+//! This power comes from double reflections between sea and ship, from spray and white water about the hull, and from parts
+//! that the processor leaves out of focus. Its form is chosen: the power law of the far sidelobes (r^{−3} over the area,
+//! like 1/x² along a line), continued to a finite centre.
 
 use crate::raster::{Field, Raster};
 use std::f64::consts::TAU;
 
-/// Power around one ship.
+/// Halo of one ship.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Halo {
     /// Imaged midship (x, y) \[m\].
@@ -28,7 +28,7 @@ pub(crate) struct Halo {
 
 /// Second moments of a hull on the sea.
 ///
-/// - `[ahead_x, ahead_y]`: direction of travel, of length 1
+/// - `[ahead_x, ahead_y]`: unit vector of the direction of travel
 /// - `[length, beam]` \[m\]
 /// - returns xx, xy, yy \[m²\]
 #[must_use]
@@ -42,7 +42,7 @@ pub(crate) fn hull_moments([ahead_x, ahead_y]: [f64; 2], [length, beam]: [f64; 2
 }
 
 impl Halo {
-    /// Adds the halo to an image before speckle, `[rows, columns]` of `raster`, linear in the unit of σ⁰.
+    /// Adds the halo to an image before speckle, `[rows, columns]` of `raster`, linear in units of σ⁰.
     pub(crate) fn add(&self, intensity: &mut Field, raster: &Raster) {
         let [xx, xy, yy] = self.moments;
         let determinant = xx * yy - xy * xy;
@@ -76,8 +76,8 @@ mod tests {
         }
     }
 
-    /// The sum over the pixels of a square of half-width h is the cross section less what lies outside: between the shares outside the
-    /// ellipses that hold the square and that it holds.
+    /// The sum over the pixels of a square of half-width h is the cross section minus the part outside, which lies between
+    /// those of the circumscribed and the inscribed ellipse.
     #[test]
     fn the_halo_has_its_cross_section() {
         let raster = Raster::image(801, 801, 5.0);
@@ -98,7 +98,7 @@ mod tests {
         }
     }
 
-    /// Half the power lies within q² = 3, whatever the heading, by counting.
+    /// Half the power lies within q² = 3 for every heading, by counting.
     #[test]
     fn half_of_the_halo_lies_within_its_half_contour() {
         let raster = Raster::image(301, 301, 4.0);
@@ -111,7 +111,7 @@ mod tests {
             for i in 0..raster.rows {
                 for j in 0..raster.columns {
                     let [x, y] = [raster.x(j) - 40.0, raster.y(i) + 25.0];
-                    // Along and across the heading the moments are principal.
+                    // Along and across the heading, the moments are principal.
                     let [along, across] = [x * sin + y * cos, x * cos - y * sin];
                     let q = along * along / (180f64.powi(2) / 12.0 + 100.0)
                         + across * across / (28f64.powi(2) / 12.0 + 100.0);
@@ -120,8 +120,8 @@ mod tests {
                     }
                 }
             }
-            // An ellipse of half-axes 92 and 22 m on pixels of 4 m: its edge, 380 m, is uncertain by a quarter of a pixel
-            // at random, and its power there is 1/16 of the peak.
+            // An ellipse of half-axes 92 and 22 m on pixels of 4 m: its edge, 380 m long, is uncertain by a quarter of a
+            // pixel at random, where the power is 1/16 of the peak.
             assert!((inside / 900.0 - 0.5).abs() < 0.01, "{inside}");
         }
     }

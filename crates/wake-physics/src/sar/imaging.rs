@@ -1,24 +1,24 @@
-//! What the radar does to its sources: where the power of a source pixel goes, and how wide.
+//! Response of the radar to a source pixel: displacement and width of its power.
 
 use crate::raster::{Field, Raster};
 use crate::sar::AzimuthResolution;
 use crate::sar::taps::Steps;
 use std::f64::consts::PI;
 
-/// The radar's part of velocity bunching.
+/// Parameters of the radar for velocity bunching.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Imaging {
     /// Range over platform speed R/V \[s\], at least 0.
     pub range_to_velocity: f64,
     /// Incidence angle θ \[rad\], between 0 and π/2.
     pub incidence: f64,
-    /// Azimuth resolution ρ' and how it depends on acceleration.
+    /// Azimuth resolution ρ' and its dependence on acceleration.
     pub resolution: AzimuthResolution,
 }
 
-/// Imaged fields, on a raster with a margin around the image, all finite.
+/// Fields to be imaged, on a raster with a margin around the image, all finite.
 ///
-/// An absent field is an absent effect, and costs nothing.
+/// An absent field means an absent effect, at no cost.
 #[derive(Debug, Clone, Copy)]
 pub struct Sources<'a> {
     /// The pixels of the fields.
@@ -33,11 +33,11 @@ pub struct Sources<'a> {
     pub elevation: Option<&'a Field>,
 }
 
-/// Smallest variance of the azimuth response [pixel²]: half a pixel of standard deviation, a width at half
-/// power of 1.2 pixels. A narrower response would fall between the pixels.
+/// Smallest variance of the azimuth response [pixel²]: a standard deviation of half a pixel, or a width at half power of
+/// 1.2 pixels. A narrower response would fall between the pixels.
 pub(crate) const SMALLEST_VARIANCE: f64 = 0.25;
 
-/// Velocity, acceleration and elevation to rows, columns and widths.
+/// Factors from velocity, acceleration and elevation to rows, widths and columns.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Response {
     /// Rows towards row 0 per velocity toward the radar [s/m].
@@ -48,12 +48,12 @@ pub(super) struct Response {
     pub(super) variance: f64,
     /// Variance per squared acceleration [pixel² s⁴/m²].
     pub(super) variance_per_square: f64,
-    /// Row and column of the image less those of the sources.
+    /// Row and column in the image minus those in the sources.
     pub(super) offset: [i64; 2],
 }
 
 impl Imaging {
-    /// Pixels of one column over which the power of a source is spread in azimuth, about.
+    /// Approximate number of pixels of a column over which the power of a source is spread in azimuth.
     ///
     /// - `acceleration` toward the radar [m/s²]; `spacing` of the pixels \[m\]; `tolerance` of the image
     pub(crate) fn taps(&self, acceleration: f64, spacing: f64, tolerance: f64) -> f64 {
@@ -65,6 +65,8 @@ impl Imaging {
 }
 
 impl Response {
+    /// Response of sources on the pixels of an image.
+    ///
     /// # Panics
     ///
     /// If the rasters have different spacings.
@@ -89,7 +91,7 @@ impl Response {
         }
     }
 
-    /// Variance of the response in azimuth [pixel²] at an acceleration [m/s²].
+    /// Variance of the azimuth response [pixel²] at an acceleration [m/s²].
     pub(super) fn variance_at(&self, acceleration: f64) -> f64 {
         (self.variance + self.variance_per_square * acceleration * acceleration)
             .max(SMALLEST_VARIANCE)
@@ -97,9 +99,11 @@ impl Response {
 }
 
 impl Sources<'_> {
+    /// Checks the sizes of the fields.
+    ///
     /// # Panics
     ///
-    /// If a field is not of the raster's size.
+    /// If a field does not match the raster in size.
     pub(super) fn check(&self) {
         let fields = [
             Some(self.sigma0),

@@ -1,12 +1,12 @@
-//! The impulse response of the radar: from a rough surface to a complex image, and looks of it.
+//! Impulse response of the radar: from a rough surface to a complex image and its looks.
 //!
 //! ```text
 //! E = √(I/2) (g₁ + i g₂)                       reflectivity of a rough surface of intensity I, white
 //! S = F⁻¹[F[E] W_x(f_x) W_y(f_y)] / √mean(W²)  single-look complex image
 //! ⟨|S|²⟩ = I ⊛ |h|² / ∫|h|²                    its intensity, in the unit of I
 //! ```
-//!
-//! Sea, noise and ships pass through the same filter. A point of cross-section σ is √σ/Δ in one cell of E, Δ the spacing;
+//! Sea, noise and ships pass through the same filter. A point of cross section σ is √σ/Δ in one cell of E, with Δ the
+//! spacing; its image integrates to σ.
 //! its image integrates to σ.
 
 use crate::fft::{self, Filtered, LowPass};
@@ -18,16 +18,16 @@ use num_complex::Complex32;
 use rand::Rng;
 use std::f64::consts::TAU;
 
-/// Resolutions between the image and the edge of the sources: sidelobes that come around lie beyond (chosen).
+/// Resolutions between the image and the edge of the sources: sidelobes that wrap around stay beyond it (chosen).
 const GUARD: f64 = 8.0;
 
-/// Random lines between two looks.
+/// Random lines from one look to the next.
 const LOOK_LINES: u64 = 1 << 20;
 
 /// Impulse response along one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Axis {
-    /// Resolution ρ \[m\]: the width at half power of the response to a point.
+    /// Resolution ρ \[m\]: the half-power width of the response to a point.
     pub resolution: f64,
     /// Weight over the bandwidth.
     pub window: Window,
@@ -40,12 +40,12 @@ impl Axis {
         self.window.width() / self.resolution
     }
 
-    /// What is left of a wave of the mean intensity, by its wavenumber [rad/m] along this axis \[1\].
+    /// Intensity transfer function at a wavenumber [rad/m] along this axis \[1\].
     pub(crate) fn intensity_transfer(&self, k: f64) -> f64 {
         self.window.intensity_transfer(k / (TAU * self.bandwidth()))
     }
 
-    /// W at the frequencies of an FFT of `size` values, with Σ W² = `size`: white noise keeps its power.
+    /// W at the frequencies of an FFT of `size` values, with Σ W² = `size`, so that white noise keeps its power.
     fn band(&self, size: usize, spacing: f64) -> fft::Band {
         let step = 1.0 / (size as f64 * spacing * self.bandwidth());
         let highest = ((0.5 / step).floor() as usize).min((size - 1) / 2);
@@ -60,72 +60,72 @@ impl Axis {
 /// Impulse response of a radar in ground range x and azimuth y.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImpulseResponse {
-    /// In ground range.
+    /// Response in ground range.
     pub range: Axis,
-    /// In azimuth.
+    /// Response in azimuth.
     pub azimuth: Axis,
 }
 
-/// A point that scatters coherently.
+/// A coherent point scatterer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointTarget {
-    /// Imaged place (x, y) \[m\].
+    /// Imaged position (x, y) \[m\].
     pub position: [f64; 2],
     /// Radar cross section \[m²\], at least 0.
     pub cross_section: f64,
 }
 
-/// Imaged surface and points.
+/// Surface and points to be imaged.
 #[derive(Debug, Clone, Copy)]
 pub struct Reflectivity<'a> {
-    /// Places of the intensity; at least the image and its guard.
+    /// Pixels of the intensity: at least the image and its guard.
     pub raster: &'a Raster,
-    /// Mean intensity of the rough surface, noise included, in the unit of σ⁰.
+    /// Mean intensity of the rough surface, noise included, in units of σ⁰.
     pub intensity: &'a Field,
     /// Ships and their azimuth ambiguities.
     pub points: &'a [PointTarget],
 }
 
-/// Looks that are averaged.
+/// Parameters of multilooking.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Looks {
-    /// Equivalent number of looks, at least 1; looks that overlap are worth less than their number, see
+    /// Equivalent number of looks, at least 1. Overlapping looks count less than their number, see
     /// [`Window::overlapping_looks`].
     pub equivalent: f64,
-    /// Seed: the same numbers whatever the number of threads.
+    /// Seed; the results do not depend on the number of threads.
     pub seed: u64,
 }
 
 impl ImpulseResponse {
-    /// Rows and columns that the sources need around the image, in their own spacing \[m\].
+    /// Rows and columns of sources needed around the image, at their own spacing \[m\].
     #[must_use]
     pub fn guard(&self, spacing: f64) -> [usize; 2] {
         [self.azimuth, self.range].map(|axis| (GUARD * axis.resolution / spacing).ceil() as usize)
     }
 
-    /// Largest spacing of sources that carry the intensity \[m\], 1/(2B) of each axis.
+    /// Largest source spacing that resolves the intensity \[m\], 1/(2B) of the finer axis.
     #[must_use]
     pub(crate) fn carrying_spacing(&self) -> f64 {
         let carried = [self.range, self.azimuth].map(|axis| 0.5 / axis.bandwidth());
         carried[0].min(carried[1])
     }
 
-    /// Largest spacing of the sources \[m\]: what carries the intensity, and ρ/4 of the coarser axis (chosen), so that
-    /// brightness that comes of waves shorter than the response is the same on finer ones.
+    /// Largest source spacing \[m\]: it resolves the intensity and is at most ρ/4 of the coarser axis (chosen), so that
+    /// brightness due to waves shorter than the response does not change on finer sources.
     #[must_use]
     pub(crate) fn largest_spacing(&self) -> f64 {
         let coarser = self.range.resolution.max(self.azimuth.resolution);
         (coarser / 4.0).min(self.carrying_spacing())
     }
 
-    /// Largest correlation of the speckle of two pixels of a row or a column, see [`Window::pixel_correlation`].
+    /// Largest speckle correlation between two pixels of a row or a column, see [`Window::pixel_correlation`].
     #[must_use]
     pub fn pixel_correlation(&self, spacing: f64) -> f64 {
         let of = |axis: &Axis| axis.window.pixel_correlation(spacing / axis.resolution);
         of(&self.range).max(of(&self.azimuth))
     }
 
-    /// Mean over all speckle of the image's intensity, I ⊛ |h|²/∫|h|², `[rows, columns]` of the image.
+    /// Mean of the image's intensity over all speckle, I ⊛ |h|²/∫|h|², `[rows, columns]` of the image.
     ///
     /// # Panics
     ///
@@ -137,7 +137,7 @@ impl ImpulseResponse {
         mean
     }
 
-    /// [`Self::mean`] of an intensity that may be negative, such as a derivative.
+    /// [`Self::mean`] for an intensity that may be negative, such as a derivative.
     pub(crate) fn filtered(&self, sources: &Reflectivity<'_>, image: &Raster) -> Field {
         let view = View::new(sources, image);
         let raster = sources.raster;
@@ -170,7 +170,7 @@ impl ImpulseResponse {
         out
     }
 
-    /// One complex image S, `[rows, columns]` of the image; |S|² is its intensity.
+    /// Single-look complex image S, `[rows, columns]` of the image; |S|² is its intensity.
     ///
     /// # Panics
     ///
@@ -190,15 +190,15 @@ impl ImpulseResponse {
         out
     }
 
-    /// The mean intensity of independent looks, `[rows, columns]` of the image.
+    /// Mean intensity of independent looks, `[rows, columns]` of the image.
     ///
-    /// Whole looks weigh the same and the last one less, so that (Σw)²/Σw² is the equivalent number asked for. Mean,
-    /// variance and correlation are those of overlapping bands of one aperture.
+    /// All looks have the same weight except the last, which has less, so that (Σw)²/Σw² is the requested equivalent
+    /// number. Mean, variance and correlation are those of overlapping bands of one aperture.
     ///
     /// # Panics
     ///
-    /// If the image's spacing is no multiple of the sources', its pixels lie between theirs or outside them, or the
-    /// intensity is not of the raster's size.
+    /// If the image's spacing is not a multiple of the sources', its pixels lie between theirs or outside them, or the
+    /// intensity does not match the raster in size.
     #[must_use]
     pub fn multilook(&self, sources: &Reflectivity<'_>, image: &Raster, looks: &Looks) -> Field {
         let weights = look_weights(looks.equivalent);
@@ -217,13 +217,13 @@ impl ImpulseResponse {
         out
     }
 
-    /// What a look passes.
+    /// The low-pass filter of a look.
     fn filter(&self, view: &View, sources: &Reflectivity<'_>) -> LowPass {
         let bands = self.bands(view, sources.raster.spacing);
         LowPass::new(view.sizes, view.step, bands)
     }
 
-    /// Weights of rows and columns.
+    /// Filter weights of rows and columns.
     fn bands(&self, view: &View, spacing: f64) -> [fft::Band; 2] {
         [
             self.azimuth.band(view.sizes[0], spacing),
@@ -232,7 +232,7 @@ impl ImpulseResponse {
     }
 }
 
-/// Where the image lies among the sources.
+/// Position of the image within the sources.
 struct View {
     sizes: [usize; 2],
     step: usize,
@@ -300,7 +300,7 @@ impl View {
     }
 }
 
-/// One look: rough surface and points with the phases of its number.
+/// One look: rough surface and points, with random phases determined by the look's number.
 fn look(
     filter: &LowPass,
     view: &View,
@@ -327,9 +327,9 @@ fn look(
     filter.filtered(raster.rows, fill, &points, &view.window)
 }
 
-/// Weights of looks, with sum 1, so that 1/Σw² is `equivalent`.
+/// Weights of looks with sum 1, such that 1/Σw² is `equivalent`.
 ///
-/// m whole looks of weight 1 and one of weight a with (m + a)² = n(m + a²), n the equivalent number.
+/// m full looks of weight 1 and one of weight a with (m + a)² = n(m + a²), n being the equivalent number.
 fn look_weights(equivalent: f64) -> Vec<f64> {
     let n = equivalent.max(1.0);
     let full = n.floor();
@@ -346,7 +346,7 @@ fn look_weights(equivalent: f64) -> Vec<f64> {
     weights.iter().map(|w| w / (full + last)).collect()
 }
 
-/// Weights of the intensity: the autocorrelation of those of the amplitude, 1 at the frequency 0.
+/// Weights of the intensity: the autocorrelation of the amplitude's weights, 1 at frequency 0.
 fn power_band(band: &fft::Band) -> fft::Band {
     let weights = &band.0;
     let total: f64 = weights.iter().map(|&w| f64::from(w * w)).sum();
@@ -363,7 +363,7 @@ fn power_band(band: &fft::Band) -> fft::Band {
     )
 }
 
-/// One row of the reflectivity √(I/2)(g₁ + i g₂): modulus √(−I ln u), phase uniform (Box and Muller 1958).
+/// One row of the reflectivity √(I/2)(g₁ + i g₂), with modulus √(−I ln u) and uniform phase (Box and Muller 1958).
 fn rough_row(intensity: &[f32], seed: u64, line: u64, row: &mut [Complex32]) {
     let mut random = generator(seed, Stream::Reflectivity, line);
     let bits: Vec<u64> = intensity.iter().map(|_| random.next_u64()).collect();

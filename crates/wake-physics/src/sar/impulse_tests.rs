@@ -5,7 +5,7 @@ use crate::fft::fast_length;
 use crate::sar::speckle::equivalent_looks;
 use std::f64::consts::PI;
 
-/// Sources around an image of 10 m pixels, `step` of them a pixel.
+/// Sources around an image of 10 m pixels, `step` sources per pixel side.
 fn rasters(response: &ImpulseResponse, size: [usize; 2], step: usize) -> (Raster, Raster) {
     let image = Raster::image(size[0], size[1], 10.0);
     let spacing = image.spacing / step as f64;
@@ -20,7 +20,7 @@ fn rasters(response: &ImpulseResponse, size: [usize; 2], step: usize) -> (Raster
     (fine.with_margin(rows, columns), image)
 }
 
-/// As Sentinel-1 makes its ground-range products, first sub-swath: 20.3 m, Hamming 0.70, by 18.4 m, unwindowed.
+/// Response of Sentinel-1 ground-range products, first sub-swath: 20.3 m, Hamming 0.70, by 18.4 m, unweighted.
 fn sentinel() -> ImpulseResponse {
     ImpulseResponse {
         range: Axis {
@@ -38,7 +38,7 @@ fn constant(raster: &Raster) -> Field {
     Field::constant(raster, 0.4)
 }
 
-/// Correlation of pixels `lag` apart, along columns (range) or rows (azimuth).
+/// Correlation of pixels `lag` apart along a row (range) or a column (azimuth).
 fn correlation(image: &Field, along_range: bool, lag: usize) -> f64 {
     let mean = image.mean();
     let mut sum = 0.0;
@@ -57,7 +57,7 @@ fn correlation(image: &Field, along_range: bool, lag: usize) -> f64 {
     sum / square
 }
 
-/// The direct sum over the scatterers, with the closed-form response repeated with the period of the FFT.
+/// Against the direct sum over the scatterers, with the closed-form response repeated at the FFT's period.
 #[test]
 fn single_look_is_the_sum_over_its_scatterers() {
     let response = ImpulseResponse {
@@ -83,8 +83,8 @@ fn single_look_is_the_sum_over_its_scatterers() {
     };
     let seed = 5;
     let found = response.single_look(&sources, &image, seed);
-    // The sum over the period of h, as the band is the spectrum at the multiples of 1/period. W has jumps at the ends of
-    // its band, so the frequencies of the FFT hold ∫W² to one part in their number only: the gain is theirs.
+    // The sum over the period of h, as the band samples the spectrum at multiples of 1/period. W jumps at the ends of its
+    // band, so the FFT's frequencies represent ∫W² only to one part in their number, hence the gain.
     let kernel = |axis: &Axis, size: usize, x: f64| {
         let band = axis.band(size, raster.spacing);
         let period = size as f64 * raster.spacing;
@@ -103,7 +103,7 @@ fn single_look_is_the_sum_over_its_scatterers() {
     let sizes = LowPass::sizes([raster.rows, raster.columns], 2);
     let down = |y: f64, from: f64| kernel(&response.azimuth, sizes[0], y - from);
     let right = |x: f64, from: f64| kernel(&response.range, sizes[1], x - from);
-    // The same random numbers, through the same generators.
+    // The same random numbers, from the same generators.
     let scatterers: Vec<Vec<Complex32>> = (0..raster.rows)
         .map(|i| {
             let mut row = vec![Complex32::ZERO; raster.columns];
@@ -143,7 +143,7 @@ fn single_look_is_the_sum_over_its_scatterers() {
         }
     }
     let rms = (square / image.len() as f64).sqrt();
-    // The sum over periods is cut at 4000: pairs of terms fall as 1/n², 1e-4 is left of each axis.
+    // The sum over periods is cut at 4000: pairs of terms fall as 1/n², leaving 1e-4 per axis.
     assert!(worst < 1e-3 * rms, "{worst} of {rms}");
 }
 
@@ -166,10 +166,10 @@ fn a_point_keeps_its_cross_section_and_has_the_response() {
     let fine = raster_of(&image, 4);
     let area = fine.spacing * fine.spacing;
     let sum: f64 = s.iter().map(|v| f64::from(v.norm_sqr()) * area).sum();
-    // Outside 480 m on either side lies 1/(π² B x) of a uniform axis: 0.5 %.
+    // For a uniform axis 1/(π² B x) lies outside 480 m on either side: 0.5 %.
     assert!((sum / 5e3 - 1.0).abs() < 8e-3, "{sum}");
-    // σ B_x B_y L_x L_y at the place itself, and half of it ρ/2 away; the band is cut to whole frequencies, one part
-    // in the number of them.
+    // σ B_x B_y L_x L_y at the point itself, and half of that ρ/2 away; the band is cut to whole frequencies, an error of
+    // one part in their number.
     let frequencies = response.azimuth.bandwidth() * fine.rows as f64 * fine.spacing;
     let loss = |axis: &Axis| 10f64.powf(-0.1 * axis.window.loss());
     let peak = 5e3
@@ -197,14 +197,14 @@ fn a_point_keeps_its_cross_section_and_has_the_response() {
             "{dx} {dy}"
         );
     }
-    // The mean is the same for a single point.
+    // The mean of a single point is the same.
     let mean = response.mean(&sources, &fine);
     for (m, s) in mean.values.iter().zip(&s) {
         assert!((f64::from(*m) - f64::from(s.norm_sqr())).abs() < 1e-5 * peak);
     }
 }
 
-/// The image's places with the pixels of its sources.
+/// The area of the image in source pixels.
 fn raster_of(image: &Raster, step: usize) -> Raster {
     Raster {
         rows: image.rows * step,
@@ -215,8 +215,8 @@ fn raster_of(image: &Raster, step: usize) -> Raster {
     }
 }
 
-/// Lags and looks as measured on the sea of a Sentinel-1 IW GRDH product: 0.63 0.15 0.01 in range, 0.43 −0.01 in
-/// azimuth, 4.9 looks; here five looks of 25 % overlap.
+/// Correlations and looks as measured on the sea in a Sentinel-1 IW GRDH product: 0.63 0.15 0.01 in range, 0.43 −0.01 in
+/// azimuth, 4.9 looks; here five looks with 25 % overlap.
 #[test]
 fn the_sea_of_a_real_product() {
     let response = sentinel();
@@ -233,7 +233,7 @@ fn the_sea_of_a_real_product() {
         seed: 1,
     };
     let found = response.multilook(&sources, &image, &looks);
-    // 160,000 pixels of 2.56 × 2.08 a sample: 30,000 samples; four standard errors of a correlation: 0.023.
+    // 160,000 pixels at 2.56 × 2.08 per independent sample: 30,000 samples; four standard errors of a correlation: 0.023.
     let samples = 160_000.0 / (2.56 * 2.08);
     let error = 4.0 / f64::sqrt(samples);
     for (lag, measured) in [(1, 0.63), (2, 0.15), (3, 0.01)] {
@@ -244,7 +244,7 @@ fn the_sea_of_a_real_product() {
         let r = correlation(&found, false, lag);
         assert!((r - measured).abs() < error, "azimuth {lag}: {r}");
     }
-    // Of mean²/variance: √((2 + 10/N)/samples).
+    // Relative error of mean²/variance: √((2 + 10/N)/samples).
     let enl = equivalent_looks(&found);
     assert!(
         (enl / 4.9 - 1.0).abs() < 4.0 * (4.0 / samples).sqrt(),
@@ -253,7 +253,7 @@ fn the_sea_of_a_real_product() {
     assert!((found.mean() / 0.4 - 1.0).abs() < 4.0 / (4.9 * samples).sqrt());
 }
 
-/// One look: exponential intensity, lags of the closed form, whatever the window.
+/// A single look has exponential intensity and the correlations of the closed form for every window.
 #[test]
 fn lags_are_those_of_the_window() {
     for window in [Window::Uniform, Window::Hamming(0.75), Window::Kaiser(2.5)] {
@@ -289,12 +289,12 @@ fn lags_are_those_of_the_window() {
                 );
             }
         }
-        // Exponential: mean²/variance 1, with the error √(8/samples) of one look.
+        // Exponential: mean²/variance is 1, with the error √(8/samples) for one look.
         assert!((equivalent_looks(&found) - 1.0).abs() < 4.0 * (8.0 / samples).sqrt());
     }
 }
 
-/// The mean over many looks of a surface that varies is the mean intensity.
+/// The mean over many looks of a varying surface is the mean intensity.
 #[test]
 fn the_mean_of_looks_is_the_smeared_intensity() {
     let response = sentinel();
@@ -324,14 +324,14 @@ fn the_mean_of_looks_is_the_smeared_intensity() {
     };
     let found = response.multilook(&sources, &image, &looks);
     for (found, mean) in found.values.iter().zip(&mean.values) {
-        // Each look is exponential or narrower: five standard errors.
+        // Each look is exponential or narrower; five standard errors.
         let error = (found / mean - 1.0).abs();
         assert!(
             error < 5.0 / f64::from(count).sqrt() as f32,
             "{found} {mean}"
         );
     }
-    // A uniform surface stays uniform to rounding.
+    // A uniform surface stays uniform up to rounding.
     let flat = constant(&raster);
     let sources = Reflectivity {
         raster: &raster,
@@ -339,7 +339,7 @@ fn the_mean_of_looks_is_the_smeared_intensity() {
         points: &[],
     };
     let mean = response.mean(&sources, &image);
-    // The zeros beyond the sources, and the tails that reach them: 1/(π²·8·0.886) of each axis and side.
+    // The zeros beyond the sources and the tails that reach them: 1/(π²·8·0.886) per axis and side.
     for v in &mean.values {
         assert!((v / 0.4 - 1.0).abs() < 0.03, "{v}");
     }
@@ -381,7 +381,7 @@ fn seed_decides_and_threads_do_not() {
     assert_ne!(run(1, 3), run(1, 4));
 }
 
-/// The sources may begin anywhere: the window of the filter finds the image.
+/// The sources may begin anywhere: the filter's window locates the image.
 #[test]
 fn an_image_inside_a_larger_one_is_its_middle() {
     let response = sentinel();
@@ -417,7 +417,7 @@ fn an_image_inside_a_larger_one_is_its_middle() {
 #[test]
 fn a_fine_enough_grid_is_fine_enough() {
     let response = sentinel();
-    // Of the coarser axis, and twice the bandwidth of both: 20.3 m/4 is below 18.4 m/(2 · 0.886).
+    // ρ/4 of the coarser axis, and twice the bandwidth of both: 20.3 m/4 is below 18.4 m/(2 · 0.886).
     assert!((response.largest_spacing() - 20.3 / 4.0).abs() < 1e-12);
     let mut narrow = response;
     narrow.azimuth.resolution = 5.0;
@@ -425,7 +425,7 @@ fn a_fine_enough_grid_is_fine_enough() {
     assert!((response.pixel_correlation(10.0) - 0.625).abs() < 2e-3);
     // The guard is eight resolutions.
     assert_eq!(response.guard(5.0), [30, 33]);
-    // The energy beyond the guard, of the uniform axis: 1/(π² B x) on either side.
+    // Energy beyond the guard for the uniform axis: 1/(π² B x) on either side.
     let beyond = 1.0 / (PI * PI * 8.0 * response.azimuth.window.width());
     assert!(beyond < 0.02);
 }

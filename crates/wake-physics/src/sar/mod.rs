@@ -5,7 +5,7 @@
 //! ```
 //!
 //! The radar looks toward +x (ground range) and flies toward +y (azimuth, row 0 at the largest y).
-//! Intensity has the unit of σ⁰: every source pixel gives all its power, somewhere.
+//! Intensity has the unit of σ⁰: every source pixel keeps all its power.
 
 pub(crate) mod bunching;
 pub mod coherence;

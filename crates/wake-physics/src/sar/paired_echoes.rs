@@ -1,22 +1,23 @@
-//! Paired echoes of a ship's brightest points: the cross along range and azimuth.
+//! Paired echoes of a ship's brightest points, which form a cross along range and azimuth.
 //!
-//! A ripple of the phase of small amplitude b and n periods over the band makes two copies of a point, n resolution cells to either
-//! side, each with (b/2)² of its power. Random ripple makes copies at every distance, with the spectrum of the ripple as their
-//! power; flicker noise, whose spectrum is 1/f, makes
+//! A phase ripple of small amplitude b with n periods over the band makes two copies of a point, n resolution cells to
+//! either side, each with (b/2)² of its power. Random ripple makes copies at every distance, with powers that follow the
+//! ripple's spectrum. Flicker noise, with the spectrum 1/f, gives
 //!
 //! ```text
 //! σ_n ∝ σ / n,     n = 1 … 40 cells,     Σ_n σ_n = ratio · σ
 //! ```
 //!
-//! in each of the two axes, with the mean 1/n and an exponential distribution: fully developed ripple. The shares of the axes, and of
-//! the sides of each axis, are even between 0 and 1 and the same for all points of a ship: ripple of phase and of amplitude together
-//! is not symmetric. Antennas that turn and parts that vibrate on the ship modulate its echo alike.
+//! in each of the two axes; powers are exponentially distributed with a mean proportional to 1/n (fully developed ripple).
+//! The shares of the axes, and of the sides of each axis, are uniform between 0 and 1 and equal for all points of a ship:
+//! combined ripple of phase and amplitude is asymmetric. Rotating antennas and vibrating parts of the ship modulate its
+//! echo likewise.
 //!
 //! # References
 //!
-//! Klauder, Price, Darlington and Albersheim (1960), Bell Syst. Tech. J. 39, 745: paired echoes. Carrara, Goodman and Majewski (1995),
-//! Spotlight Synthetic Aperture Radar: power-law errors of phase. That the exponent is 1, the farthest cell and the number of points
-//! are chosen.
+//! Klauder, Price, Darlington and Albersheim (1960), Bell Syst. Tech. J. 39, 745: paired echoes. Carrara, Goodman and
+//! Majewski (1995), Spotlight Synthetic Aperture Radar: power-law phase errors. The exponent 1, the farthest cell and the
+//! number of points are chosen.
 
 use super::impulse::PointTarget;
 use rand::{Rng, RngExt};
@@ -25,20 +26,20 @@ use rand_distr::{Distribution, Exp1};
 /// Farthest copy [cells]: chosen.
 const FARTHEST: u32 = 40;
 
-/// Points of a ship that are copied, the brightest: chosen, others' copies vanish in the sea.
+/// Number of a ship's brightest points that are copied: chosen; copies of weaker points are hidden by the sea.
 const BRIGHTEST: usize = 3;
 
-/// Copies of points.
+/// Parameters of the copies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PairedEchoes {
-    /// Power of all copies over the power of the points that are copied.
+    /// Power of all copies over the power of the copied points.
     pub(crate) ratio: f64,
     /// Resolution in range and azimuth \[m\].
     pub(crate) cell: [f64; 2],
 }
 
 impl PairedEchoes {
-    /// Gives a part of the brightest points of a ship to their copies: the sum of cross sections stays the same.
+    /// Transfers a part of the power of a ship's brightest points to copies; the sum of cross sections is conserved.
     pub(crate) fn spread(&self, points: &mut Vec<PointTarget>, random: &mut impl Rng) {
         let brightness =
             |a: &PointTarget, b: &PointTarget| b.cross_section.total_cmp(&a.cross_section);
@@ -95,7 +96,8 @@ mod tests {
         points.iter().map(|p| p.cross_section).sum()
     }
 
-    /// Power is moved, not made; the three brightest give the ratio over one more than it, and the copies lie on their lines.
+    /// Power is conserved; the three brightest points give away the share ratio/(1 + ratio), and the copies lie on the two
+    /// axes.
     #[test]
     fn copies_take_what_points_give() {
         let echoes = PairedEchoes {
@@ -122,7 +124,7 @@ mod tests {
         }
     }
 
-    /// Mean power by distance: 1/n over the harmonic sum H(40), over 2,000 ships; the distance of copy n is n ± ½ cells.
+    /// Mean power by distance is 1/n over the harmonic sum H(40), over 2,000 ships; copy n lies at n ± ½ cells.
     #[test]
     fn power_falls_as_flicker_noise() {
         let echoes = PairedEchoes {
@@ -141,8 +143,8 @@ mod tests {
             }
         }
         let harmonic: f64 = (1..=FARTHEST).map(|n| 1.0 / f64::from(n)).sum();
-        // Powers are divided by their own sum, whose relative deviation is √(Σ 1/n²)/H = 0.3 an arm: a bias of up to 0.09 of the
-        // ratio of means; beside it the standard error of 2,000 exponentials, weighted by shares, 1/√1000.
+        // Powers are divided by their own sum, whose relative deviation is √(Σ 1/n²)/H = 0.3 per arm: a bias of up to 0.09
+        // of the ratio of means, plus the standard error of 2,000 exponentials weighted by shares, 1/√1000.
         for n in [1, 2, 5, 12, 30] {
             let expected = 1.0 / (f64::from(n) * harmonic);
             let found = power[n as usize - 1] / ships as f64;

@@ -1,4 +1,4 @@
-//! A ship as a radar at satellite incidence sees it: bright points with random shares of its radar cross section.
+//! A ship at satellite incidence: bright points with random shares of its radar cross section.
 //!
 //! ```text
 //! 10 log₁₀ σ = 10 log₁₀(0.08 L^{7/3}) − 3 dB ± 3 dB
@@ -6,10 +6,10 @@
 //! var y      = (R/V)² (σ_v² + σ_a² T²/12)             in addition to the hull's;   σ_a = 2π σ_v/P
 //! ```
 //!
-//! Roll and pitch of the period P displace the points by their velocities, of standard deviation `σ_v`, and spread each over (R/V) a T
-//! while the aperture lasts: the echo is defocused.
+//! Roll and pitch of period P displace the points by their velocities, of standard deviation `σ_v`, and spread each over
+//! (R/V) a T during the aperture: the echo is defocused.
 //!
-//! The points are the same whether an impulse response images them or not.
+//! The points are the same with and without an impulse response.
 
 use super::geometry::{azimuth_displacement, direction, layover};
 use super::impulse::PointTarget;
@@ -17,25 +17,25 @@ use crate::random::{Stream, generator};
 use rand::Rng;
 use rand_distr::{Distribution, Exp1, StandardNormal, Uniform};
 
-/// Points along the deck where a ship does not say: chosen; 2 to 11 maxima within 10 dB of the peak were counted in real echoes.
+/// Default number of points along the deck: chosen; 2 to 11 maxima within 10 dB of the peak were counted in real echoes.
 const POINTS: usize = 12;
 
-/// Points that have more than this share of a defocused echo are spread over the aperture in parts: chosen.
+/// Share of a defocused echo above which a point is spread over the aperture in parts: chosen.
 const LARGE_SHARE: f64 = 0.05;
 
-/// These parts: chosen; four resolution cells, the smear of the longest apertures, have two each.
+/// Number of these parts: chosen; the longest apertures smear over four resolution cells, two parts each.
 const PARTS: usize = 8;
 
 /// Smallest and largest share of the brightest point: chosen.
 const DOMINANT_SHARE: [f64; 2] = [0.15, 0.85];
 
-/// Standard deviation of the echo of ships of one length \[dB\]: measured on fifteen ships.
+/// Standard deviation of the echo of ships of equal length \[dB\]: measured on fifteen ships.
 const SPREAD_DB: f64 = 3.0;
 
-/// Height of the points over the water, as a share of the beam: chosen.
+/// Height of the points above the water, as a share of the beam: chosen.
 const HEIGHT_OF_BEAM: f64 = 0.4;
 
-/// Median radar cross section of ships of a length.
+/// Median radar cross section of ships of a given length.
 ///
 /// ```text
 /// 10 log₁₀ σ = 10 log₁₀(0.08 L^{7/3}) − 3 dB
@@ -46,31 +46,31 @@ const HEIGHT_OF_BEAM: f64 = 0.4;
 ///
 /// # Validity
 ///
-/// Ships of 40 to 350 m, incidence of 20 to 60°, C band; used alike for VV and HH and at L, S and X band, which is chosen.
-/// −3 dB and the spread of 3 dB fit fifteen ships measured in Sentinel-1 images (34.6 to 42.9 dB m², mean 39.0, calibrated to
-/// 1 dB). The median itself is uncertain by about 3 dB: Vachon, English and Wolfe (2007) found different scales for the same
-/// ships in two modes of one radar.
+/// Ships of 40 to 350 m, incidence of 20 to 60°, C band; used unchanged for VV and HH and at L, S and X band, which is
+/// chosen. −3 dB and the spread of 3 dB fit fifteen ships measured in Sentinel-1 images (34.6 to 42.9 dB m², mean 39.0,
+/// calibrated to 1 dB). The median itself is uncertain by about 3 dB: Vachon, English and Wolfe (2007) found different
+/// scales for the same ships in two modes of one radar.
 ///
-/// Skolnik's law for grazing incidence, 52 √f D^{3/2} m² with f in MHz and D in 1000 t, is no alternative: it was measured on
-/// naval ships of 2 to 17 thousand tonnes whose sides face the radar, and gives a ship of 195 m and 23 thousand tonnes 57.5 dB m²
-/// at X band, where this law has 39.5.
+/// Skolnik's law for grazing incidence, 52 √f D^{3/2} m² with f in MHz and D in 1000 t, does not apply: it was measured on
+/// naval ships of 2 to 17 thousand tonnes whose sides face the radar, and gives a ship of 195 m and 23 thousand tonnes 57.5
+/// dB m² at X band, where this law gives 39.5.
 ///
 /// # References
 ///
-/// Vachon, Campbell, Bjerkelund, Dobson and Rey (1997), Can. J. Remote Sens. 23, 48: the power of L, quoted from memory, not
-/// verified. Vachon, English and Wolfe (2007), DRDC Ottawa TM 2007-052: a law in length alone with a log-normal spread,
+/// Vachon, Campbell, Bjerkelund, Dobson and Rey (1997), Can. J. Remote Sens. 23, 48: the power of L, quoted from memory,
+/// not verified. Vachon, English and Wolfe (2007), DRDC Ottawa TM 2007-052: a law in length alone with a log-normal spread,
 /// 1,805 ships. Skolnik (1974), IEEE Trans. Aerosp. Electron. Syst. 10, 292.
 #[must_use]
 pub fn median_cross_section(length: f64) -> f64 {
     0.08 * length.powf(7.0 / 3.0) * 10f64.powf(-0.3)
 }
 
-/// The ship whose echo is drawn.
+/// A ship whose echo is simulated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ShipEcho {
-    /// Midship (x, y) \[m\], where the ship truly is.
+    /// True midship position (x, y) \[m\].
     pub(crate) position: [f64; 2],
-    /// Where it moves to [deg clockwise from azimuth].
+    /// Direction of motion [deg clockwise from azimuth].
     pub(crate) heading: f64,
     /// Length L \[m\].
     pub(crate) length: f64,
@@ -82,11 +82,11 @@ pub(crate) struct ShipEcho {
     pub(crate) roll_velocity: f64,
     /// Standard deviation of their acceleration [m/s²].
     pub(crate) roll_acceleration: f64,
-    /// Number of points; 12 where absent.
+    /// Number of points; 12 by default.
     pub(crate) points: Option<u32>,
 }
 
-/// How the echo is imaged.
+/// Imaging parameters of the echo.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Viewing {
     /// Incidence θ \[rad\].
@@ -98,24 +98,24 @@ pub(crate) struct Viewing {
 }
 
 impl ShipEcho {
-    /// Cross section of all points together \[m²\].
+    /// Total cross section of all points \[m²\].
     ///
     /// - `number` of the ship in its scene, as for [`scatterers`](Self::scatterers)
     pub(crate) fn cross_section(&self, seed: u64, number: usize) -> f64 {
         self.drawn_cross_section(&mut generator(seed, Stream::Scatterers, number as u64))
     }
 
-    /// The cross section by the first number of the ship's stream.
+    /// The cross section from the first random number of the ship's stream.
     fn drawn_cross_section(&self, random: &mut impl Rng) -> f64 {
         let normal: f64 = StandardNormal.sample(random);
         median_cross_section(self.length) * 10f64.powf(0.1 * SPREAD_DB * normal)
     }
 
-    /// The points, where they are imaged.
+    /// The points at their imaged positions.
     ///
-    /// Places along the deck are even with jitter, shares exponential but for one point that has 0.15 to
-    /// 0.85 of all. Each is displaced in azimuth by its velocity and toward the radar by its height (0.4 of the beam,
-    /// chosen). Together they have the median cross section times a log-normal factor of 3 dB.
+    /// Positions along the deck are evenly spaced with jitter, shares are exponential except for one point that has 0.15 to
+    /// 0.85 of the total. Each point is displaced in azimuth by its velocity and toward the radar by its height (0.4 of the
+    /// beam, chosen). Together they have the median cross section times a log-normal factor of 3 dB.
     ///
     /// - `number` of the ship in its scene: the same seed and number give the same echo
     #[must_use]
@@ -162,7 +162,7 @@ impl ShipEcho {
     }
 }
 
-/// Shares with sum 1: exponential, one of them drawn.
+/// Random shares with sum 1: exponential, except for one dominant share.
 fn shares(random: &mut impl Rng, count: usize) -> Vec<f64> {
     if count == 1 {
         return vec![1.0];
@@ -184,12 +184,12 @@ fn uniform(random: &mut impl Rng, [low, high]: [f64; 2]) -> f64 {
     distribution.map_or(low, |d| d.sample(random))
 }
 
-/// Azimuth ambiguities: fainter copies of points, the same distance before and behind them.
+/// Azimuth ambiguities: fainter copies of points, at the same distance ahead and behind.
 ///
 /// - `distance` \[m\], see [`crate::scene::sensor::ambiguity_distance`]
-/// - `level`: their cross section over that of the points \[1\]
+/// - `level`: cross section of the copies over that of the points \[1\]
 ///
-/// Their shift in range and their smear are left out.
+/// Their range shift and smear are neglected.
 #[must_use]
 pub(crate) fn ambiguities(points: &[PointTarget], distance: f64, level: f64) -> Vec<PointTarget> {
     let copy = |point: &PointTarget, shift: f64| PointTarget {
@@ -225,7 +225,7 @@ mod tests {
         }
     }
 
-    /// 0.08 L^{7/3} is 35.7, 39.8 and 42.7 dB m² at 100, 150 and 200 m; 3 dB less.
+    /// 0.08 L^{7/3} is 35.7, 39.8 and 42.7 dB m² at 100, 150 and 200 m; the law is 3 dB below.
     #[test]
     fn cross_section_by_length() {
         for (length, expected) in [(100.0, 35.7), (150.0, 39.8), (200.0, 42.7)] {
@@ -234,7 +234,7 @@ mod tests {
         }
     }
 
-    /// Over many ships: median and spread of the sum, mean place, extent along the heading, layover.
+    /// Over many ships: median and spread of the sum, mean position, extent along the heading, layover.
     #[test]
     fn many_ships_have_the_statistics_of_the_model() {
         let count = 4000;
@@ -278,7 +278,7 @@ mod tests {
         }
     }
 
-    /// Roll of 0.3 m/s smears the points by 34.5 m in azimuth, and only there.
+    /// Roll of 0.3 m/s smears the points by 34.5 m, in azimuth only.
     #[test]
     fn roll_smears_in_azimuth() {
         let rolling = ShipEcho {
@@ -304,8 +304,8 @@ mod tests {
         );
     }
 
-    /// Velocity and acceleration of a defocused ship of 200 points: variance of the azimuth, weighted with power, is
-    /// `(R/V)² (σ_v² + σ_a² T²/12)` more than the variance of the hull, 14²/3 across the heading. The cross section stays the same.
+    /// Velocity and acceleration of a defocused ship of 200 points: the power-weighted variance of the azimuth exceeds the
+    /// variance of the hull, 14²/3 across the heading, by `(R/V)² (σ_v² + σ_a² T²/12)`. The cross section stays the same.
     #[test]
     fn a_rolling_ship_is_defocused() {
         let rolling = ShipEcho {
@@ -336,8 +336,8 @@ mod tests {
         let variance = sum / power;
         let motion = 115.0f64.powi(2) * (0.2f64.powi(2) + (0.5f64 * 0.8).powi(2) / 12.0);
         let expected = motion + 28.0f64.powi(2) / 12.0;
-        // One point has half the power in the mean, so that a ship is little more than one draw: the variance of a squared normal
-        // is twice its square, weighted by the mean square of the shares, 0.3. Four standard errors.
+        // One point has half the power on average, so a ship counts little more than one sample: the variance of a squared
+        // normal is twice its square, weighted by the mean square of the shares, 0.3. Four standard errors.
         let error = 4.0 * (2.0 * 0.3 / ships as f64).sqrt();
         assert!(
             (variance / expected - 1.0).abs() < error,

@@ -1,11 +1,11 @@
-//! Velocity bunching as a smooth function of its sources, with derivatives: the sum of `bunching` without its corners.
+//! Velocity bunching as a smooth function of its sources, with derivatives: the sum of `bunching` with rounded corners.
 //!
 //! ```text
 //! I(y, x) = Σ σ⁰ P(y − y'; v) H(x − x'),      P(y; v) ∝ exp(−y²/2v)
 //! ```
 //!
-//! P is sampled and normalised as in `bunching`, on steps that are chosen once. The weight of range H is linear there and
-//! has a corner at each pixel; here the corners are rounded over a thirty-second of a pixel on either side,
+//! P is sampled and normalised as in `bunching`, on steps that are chosen once. The range weight H is linear there and has
+//! a corner at each pixel; here the corners are rounded over a thirty-second of a pixel on either side,
 //!
 //! ```text
 //! H(x) = (a(x − 1) − 2 a(x) + a(x + 1))/2,    a(x) = |x|, and (3 + 6 t² − t⁴)/8 · d for t = |x|/d < 1
@@ -23,13 +23,13 @@ use rayon::prelude::*;
 /// Distance from a corner within which it is rounded [pixels].
 const ROUNDED: f64 = 1.0 / 32.0;
 
-/// Largest share of a source's power that the kernel may put in the wrong place.
+/// Largest share of a source's power that the kernel may misplace.
 const TOLERANCE: f64 = 1e-6;
 
-/// Columns of a block without and with derivatives: its sums stay in the cache.
+/// Columns of a block without and with derivatives, so that its sums stay in the cache.
 const BLOCK: [usize; 2] = [48, 24];
 
-/// A source: what it returns, and where that is imaged.
+/// A source: its return, and where it is imaged.
 pub(crate) struct Source<const N: usize> {
     /// σ⁰.
     pub(crate) power: Dual<N>,
@@ -41,7 +41,7 @@ pub(crate) struct Source<const N: usize> {
     pub(crate) variance: Dual<N>,
 }
 
-/// The sum, its steps chosen.
+/// The imaging sum with its steps chosen.
 #[derive(Debug)]
 pub(crate) struct SmoothSum {
     sources: Raster,
@@ -50,14 +50,14 @@ pub(crate) struct SmoothSum {
     steps: Steps,
     filling_first: i64,
     filling: Vec<Vec<f32>>,
-    /// Columns that a source may be displaced by, rounded up.
+    /// Columns by which a source may be displaced, rounded up.
     lean: usize,
-    /// Steps before row 0 of the image, and after its last.
+    /// Steps before row 0 of the image and after its last row.
     pad: usize,
     count: usize,
 }
 
-/// Displacements and widths by velocity, elevation and acceleration.
+/// Factors from velocity, elevation and acceleration to displacements and widths.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Displacement {
     /// Rows toward row 0 per velocity toward the radar [s/m].
@@ -66,7 +66,7 @@ pub(crate) struct Displacement {
     pub(crate) columns_per_elevation: f64,
     /// Variance in azimuth without acceleration [rows²].
     pub(crate) variance: f64,
-    /// The same per squared acceleration [rows² s⁴/m²].
+    /// Variance per squared acceleration [rows² s⁴/m²].
     pub(crate) variance_per_square: f64,
 }
 
@@ -82,7 +82,7 @@ impl Displacement {
     }
 }
 
-/// |x| with its corner rounded, and the slope.
+/// |x| with a rounded corner, and its slope.
 #[inline(always)]
 fn rounded(x: f64) -> [f64; 2] {
     let t = x / ROUNDED;
@@ -104,6 +104,8 @@ fn hat(x: f64) -> [f64; 2] {
 }
 
 impl SmoothSum {
+    /// Sum of sources imaged on the pixels of an image.
+    ///
     /// - `narrowest`, `widest`: variances in azimuth [rows²]; `lean`: largest displacement in range [columns]
     pub(crate) fn new(
         [sources, image]: [&Raster; 2],
@@ -135,9 +137,9 @@ impl SmoothSum {
         }
     }
 
-    /// The image, and its derivatives by the values numbered `by`.
+    /// Computes the image and its derivatives by the variables with the indices `by`.
     ///
-    /// - `source`: of a row and column of the sources
+    /// - `source`: returns the source at a row and column
     pub(crate) fn image<const N: usize>(
         &self,
         by: &[usize],
@@ -179,7 +181,7 @@ impl SmoothSum {
         fields
     }
 
-    /// Adds all sources that reach these columns, the first and their number.
+    /// Adds all sources that reach the given columns (the first column and their number).
     #[inline(always)]
     fn block<const N: usize>(
         &self,
@@ -257,7 +259,7 @@ impl SmoothSum {
     }
 }
 
-/// The response of one source on the steps, and its derivatives by the place and the variance.
+/// Response of one source on the steps, and its derivatives by position and variance.
 #[derive(Default)]
 struct Taps {
     values: [Vec<f64>; 3],
@@ -265,9 +267,9 @@ struct Taps {
 }
 
 impl Taps {
-    /// Returns the first step; none for a source beyond the steps.
+    /// Returns the first step, or `None` for a source beyond the steps.
     ///
-    /// - `BY`: with derivatives
+    /// - `BY`: whether to compute derivatives
     #[inline(always)]
     fn set<const BY: bool>(
         &mut self,
@@ -311,7 +313,7 @@ impl Taps {
             sums[1] += places[n];
             sums[2] += widths[n];
         }
-        // The response keeps the sum 1.
+        // Normalises the response to sum 1.
         let norm = 1.0 / sums[0];
         let [by_place, by_width] = [sums[1] * norm, sums[2] * norm];
         for n in 0..count {

@@ -1,4 +1,4 @@
-//! Speckle: the fluctuation of the intensity of N independent looks.
+//! Speckle: intensity fluctuation of N independent looks.
 
 use crate::random::{Stream, generator};
 use crate::raster::Field;
@@ -7,10 +7,10 @@ use rand::rngs::Xoshiro256PlusPlus;
 use rand_distr::{Distribution, Gamma};
 use rayon::prelude::*;
 
-/// Up to this many looks, a product of uniform numbers is faster than the rejection method.
+/// Largest number of looks for which a product of uniform numbers is faster than the rejection method.
 const PRODUCT_LOOKS: u32 = 8;
 
-/// Multiplies every pixel with an independent random number, Gamma-distributed with mean 1.
+/// Multiplies every pixel by an independent Gamma-distributed random number with mean 1.
 ///
 /// ```text
 /// I → I·g,     p(g) = N^N g^{N−1} e^{−N g}/Γ(N),     std(g) = 1/√N
@@ -18,12 +18,12 @@ const PRODUCT_LOOKS: u32 = 8;
 ///
 /// - `intensity` I, changed in place
 /// - `looks` N, at least 1; one look is exponential
-/// - `seed`: the same seed gives the same speckle, whatever the number of threads
+/// - `seed`: the same seed gives the same speckle for any number of threads
 ///
 /// # Validity
 ///
-/// Fully developed speckle that no pixel shares with its neighbour. Where the resolution is wider than a pixel
-/// real speckle is correlated.
+/// Fully developed speckle, independent between pixels. Where the resolution is wider than a pixel, real speckle is
+/// correlated.
 ///
 /// # References
 ///
@@ -58,7 +58,7 @@ fn speckle_row(row: &mut [f32], looks: u32, mut random: Xoshiro256PlusPlus) {
     }
 }
 
-/// Product of `count` uniform numbers of the open interval (0, 1), of 32 bits each.
+/// Product of `count` uniform 32-bit random numbers from the open interval (0, 1).
 fn product(count: u32, random: &mut Xoshiro256PlusPlus) -> f64 {
     let uniform = |bits: u64| (bits as u32 as f64 + 0.5) * 2f64.powi(-32);
     let mut product = 1.0;
@@ -72,7 +72,7 @@ fn product(count: u32, random: &mut Xoshiro256PlusPlus) -> f64 {
     product
 }
 
-/// Equivalent number of looks of an image whose scene is uniform.
+/// Equivalent number of looks of an image of a uniform scene.
 ///
 /// ```text
 /// ENL = mean² / variance
@@ -101,7 +101,7 @@ mod tests {
         field
     }
 
-    /// P(g ≤ x) for a whole number of looks: 1 − e^{−Nx} Σ_{i<N} (Nx)^i/i!, in logarithms where N is large.
+    /// P(g ≤ x) for an integer number of looks: 1 − e^{−Nx} Σ_{i<N} (Nx)^i/i!, in logarithms where N is large.
     fn erlang(looks: u32, x: f64) -> f64 {
         let mean = f64::from(looks) * x;
         let (mut log_term, mut sum) = (-mean, 0.0);
@@ -114,7 +114,7 @@ mod tests {
 
     #[test]
     fn distribution_is_gamma() {
-        // Both sides of the switch between the two methods, and the ends.
+        // Both sides of the switch between the two methods, and the ends of the range.
         for looks in [1, 2, 3, 4, 8, 9, 30, 1000] {
             let field = flat(looks, 3);
             let n = field.values.len() as f64;
@@ -128,7 +128,7 @@ mod tests {
                     (p - i as f64 / n).abs().max((p - (i + 1) as f64 / n).abs())
                 })
                 .fold(0.0, f64::max);
-            // Kolmogorov–Smirnov: exceeded by chance once in a thousand, 1.95/√n.
+            // Kolmogorov–Smirnov: exceeded by chance once in a thousand cases, 1.95/√n.
             assert!(distance < 1.95 / n.sqrt(), "{looks} looks: {distance}");
         }
     }
@@ -151,7 +151,7 @@ mod tests {
         for shift in [1, 2, field.columns, field.columns + 1] {
             let pairs = field.values.iter().zip(&field.values[shift..]);
             let covariance: f64 = pairs.map(|(&a, &b)| f64::from((a - 2.0) * (b - 2.0))).sum();
-            // A correlation of independent pixels has the standard deviation 1/√n.
+            // The correlation of independent pixels has the standard deviation 1/√n.
             assert!((covariance / (4.0 * n)).abs() < 4.0 / n.sqrt());
         }
     }

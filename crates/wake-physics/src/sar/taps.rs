@@ -1,27 +1,27 @@
-//! Gaussian taps, and how few of them are needed: the arithmetic inside the fast sum.
+//! Gaussian taps and their number: the arithmetic of the fast sum.
 
 use crate::numeric::vector::exp2_f32;
 use std::f64::consts::PI;
 
-/// Taps are computed in groups of this many.
+/// Taps are computed in groups of this size.
 pub(super) const LANES: usize = 8;
 
-/// How every Gaussian response is made of two: taps on every `step`-th row, then one fixed Gaussian that fills
-/// the rows between.
+/// Composition of every Gaussian response from two: taps on every `step`-th row, then one fixed Gaussian that fills the
+/// rows between.
 ///
 /// ```text
 /// G_v(m − t) ≈ step · Σ_n G_b(m − n·step) · G_{v−b}(n·step − t)
 /// ```
 ///
-/// The sum over n is a trapezoidal rule for the convolution of two Gaussians; with a = v − b its error relative
-/// to the whole is at most 2 exp(−2π² (a b/(a+b))/step²). So a wide response costs as few taps as a narrow one.
+/// The sum over n is a trapezoidal rule for the convolution of two Gaussians; with a = v − b its relative error is at most
+/// 2 exp(−2π² (a b/(a+b))/step²). A wide response thus costs as few taps as a narrow one.
 #[derive(Debug)]
 pub(super) struct Steps {
-    /// Rows per step; 1: no second Gaussian.
+    /// Rows per step; 1 means no second Gaussian.
     pub(super) step: usize,
     /// Variance b of the second Gaussian [rows²]; 0 at step 1.
     pub(super) filling: f64,
-    /// Standard deviations kept of each Gaussian.
+    /// Standard deviations at which each Gaussian is cut.
     pub(super) reach: f64,
 }
 
@@ -30,7 +30,7 @@ impl Steps {
     /// `tolerance`: a quarter each for the trapezoidal rule and the ends of the two Gaussians.
     pub(super) fn new(smallest: f64, tolerance: f64) -> Self {
         let per_square = (8.0 / tolerance).ln() / (2.0 * PI * PI);
-        // The best split is in halves: a b/(a+b) = v/4.
+        // The best split is into halves: a b/(a+b) = v/4.
         let step = ((smallest / (4.0 * per_square)).sqrt() as usize).max(1);
         Self {
             step,
@@ -39,17 +39,17 @@ impl Steps {
         }
     }
 
-    /// Taps for a response of variance `variance` [rows²] around any place, a multiple of [`LANES`]: what is
-    /// left out lies beyond `reach` standard deviations (half a tap further, so that a sum is at most the integral).
+    /// Number of taps for a response of variance `variance` [rows²] around any position, a multiple of [`LANES`]. The
+    /// omitted part lies beyond `reach` standard deviations (plus half a tap, so that a sum is at most the integral).
     #[inline(always)]
     pub(super) fn taps(&self, variance: f32) -> usize {
         let half = self.reach as f32 * (variance - self.filling as f32).sqrt() / self.step as f32;
-        // The conversion cuts a fraction off: one tap more makes up for it.
+        // The conversion truncates; one more tap makes up for it.
         ((2.0 * half) as usize + 2).next_multiple_of(LANES)
     }
 
-    /// The second Gaussian: for every phase `row mod step`, weights of the steps `first, first + 1, …` counted
-    /// from `row div step`. All weights of one step, over all rows, sum to 1.
+    /// The second Gaussian: for every phase `row mod step`, weights of the steps `first, first + 1, …` relative to `row div
+    /// step`. All weights of one step, over all rows, sum to 1.
     pub(super) fn filling_taps(&self) -> (i64, Vec<Vec<f32>>) {
         let side = (self.reach * self.filling.sqrt() + 0.5).ceil() as i64;
         let weight = |d: i64| {
@@ -70,8 +70,8 @@ impl Steps {
     }
 }
 
-/// Standard deviations z beyond which a Gaussian's two tails, cut off and given back to the rest, change it by
-/// at most `error`: 2·2Q(z) ≤ error, with the bound Q(z) ≤ exp(−z²/2)/(z√(2π)).
+/// Standard deviations z at which a Gaussian may be cut and renormalised with a change of at most `error`: 2·2Q(z) ≤ error,
+/// with the bound Q(z) ≤ exp(−z²/2)/(z√(2π)).
 fn reach(error: f64) -> f64 {
     (0..8).fold(3.0, |z: f64, _| {
         let ratio = 4.0 / (error * z * (2.0 * PI).sqrt());
@@ -103,14 +103,14 @@ mod tests {
 
     #[test]
     fn reach_is_that_of_the_normal_tail() {
-        // Two-sided tails 2Q(z) of the normal distribution: 0.0027 at 3, 5.733e-7 at 5 (tables). The bound used
-        // is larger than Q by at most 1/z² of it.
+        // Two-sided tails 2Q(z) of the normal distribution: 0.0027 at 3, 5.733e-7 at 5 (tables). The bound used exceeds Q
+        // by at most the fraction 1/z².
         for (z, tails) in [(3.0, 2.6998e-3), (5.0, 5.733e-7)] {
             let found = reach(2.0 * tails);
             assert!(found >= z && found < z + 0.04, "{found}");
         }
     }
-    /// The two Gaussians together are the one, at every place between the steps, for all tolerances.
+    /// The two Gaussians compose to the single one, at every position between the steps, for all tolerances.
     #[test]
     fn two_gaussians_make_one() {
         for tolerance in [1e-1, 1e-2, 1e-3, 1e-4, 1e-5] {
@@ -120,14 +120,14 @@ mod tests {
                 for i in 0..7 {
                     let place = 400.0 + 0.37 * f64::from(i);
                     let error = composed_error(&steps, variance, place);
-                    // Rounding of f32 adds a few 1e-7 to what the tolerance allows.
+                    // Rounding to f32 adds a few 1e-7 to the tolerance.
                     assert!(error < tolerance + 1e-6, "{tolerance} {smallest} {error}");
                 }
             }
         }
     }
 
-    /// Sum of |taps made in steps − normalised Gaussian| over all rows.
+    /// Sum over all rows of |taps composed in steps − normalised Gaussian|.
     fn composed_error(steps: &Steps, variance: f64, place: f64) -> f64 {
         let count = steps.taps(variance as f32);
         let narrow = (variance - steps.filling) / (steps.step * steps.step) as f64;

@@ -1,30 +1,29 @@
-//! All of σ⁰, evaluated exactly: the oracle of the table, and the figures by which a plan leaves terms out.
+//! Exact evaluation of σ⁰, the reference for the table, and estimates by which the plan leaves terms out.
 
 use crate::raster::Field;
 use crate::scattering::{SlopeCovariance, Specular, TwoScale};
 use rayon::prelude::*;
 
-/// Spacing of slopes for figures that need two digits only \[1\].
+/// Spacing of slopes for estimates of two-digit accuracy \[1\].
 const COARSE_SLOPES: f64 = 0.06;
 
-/// Fields of one size that determine σ⁰.
+/// Fields that determine σ⁰, all of one size.
 #[derive(Debug, Clone, Copy)]
 pub struct FacetFields<'a> {
     /// Slope ∂ζ/∂x, along the look direction \[1\].
     pub slope_x: &'a Field,
     /// Slope ∂ζ/∂y \[1\].
     pub slope_y: &'a Field,
-    /// Factor on the Bragg return by hydrodynamic modulation \[1\], where it counts: exp(m − ½ var m).
+    /// Factor on the Bragg return by hydrodynamic modulation \[1\], exp(m − ½ var m), if computed.
     pub modulation: Option<&'a Field>,
-    /// Share of the Bragg waves that the turbulent wake leaves, 0 to 1, where it counts.
+    /// Share of the Bragg waves that remains in the turbulent wake, 0 to 1, if computed.
     pub bragg_remaining: Option<&'a Field>,
-    /// Slopes that the pixels do not carry besides those of the sea, by place: variances xx, xy and yy \[1\], where they
-    /// count.
+    /// Additional subpixel slopes besides the sea's, by position: variances xx, xy and yy \[1\], if computed.
     pub subpixel_variances: Option<&'a [Field; 3]>,
 }
 
 impl<'a> FacetFields<'a> {
-    /// Facets of these slopes alone.
+    /// Facets with the given slopes alone.
     #[must_use]
     pub fn of_slopes(slope_x: &'a Field, slope_y: &'a Field) -> Self {
         Self {
@@ -55,7 +54,7 @@ impl<'a> FacetFields<'a> {
         (xx + yy > 0.0).then_some(SlopeCovariance { xx, xy, yy })
     }
 
-    /// Largest variance of the unresolved slopes in all.
+    /// Largest total variance of the additional subpixel slopes.
     pub(crate) fn largest_subpixel_variance(&self) -> f64 {
         let largest = self.subpixel_variances.map_or(0.0, |[xx, _, yy]| {
             let sums = xx.values.par_iter().zip(&yy.values).map(|(xx, yy)| xx + yy);
@@ -89,14 +88,14 @@ pub struct Backscatter {
 pub struct Sensitivity {
     /// Mean Bragg and specular σ⁰ \[1\].
     pub mean: [f64; 2],
-    /// Without the average over unresolved tilt; 0 if σ⁰ is 0.
+    /// Change without the average over unresolved tilt; 0 if σ⁰ is 0.
     pub tilt_average: f64,
-    /// Without the specular return; 0 if σ⁰ is 0.
+    /// Change without the specular return; 0 if σ⁰ is 0.
     pub specular: f64,
 }
 
 impl Backscatter {
-    /// Bragg and specular cross-section of a facet of resolved slope (`s_x`, `s_y`), by direct quadrature.
+    /// Bragg and specular σ⁰ of a facet of resolved slope (`s_x`, `s_y`), by direct quadrature.
     #[must_use]
     pub fn parts(&self, slope: [f64; 2]) -> [f64; 2] {
         [
@@ -105,7 +104,7 @@ impl Backscatter {
         ]
     }
 
-    /// [`Self::parts`] to about two digits, in microseconds.
+    /// [`Self::parts`] to about two digits, within microseconds.
     pub(crate) fn coarse_parts(&self, slope: [f64; 2]) -> [f64; 2] {
         [
             self.two_scale.average(slope, &self.tilt, COARSE_SLOPES),
@@ -113,7 +112,7 @@ impl Backscatter {
         ]
     }
 
-    /// σ⁰ of every pixel, exactly: the oracle of
+    /// Exact σ⁰ of every pixel, the reference for
     /// [`BackscatterTable::sigma0_field`](super::BackscatterTable::sigma0_field).
     #[must_use]
     pub fn sigma0_field(&self, fields: &FacetFields<'_>) -> Field {
@@ -127,7 +126,7 @@ impl Backscatter {
         }
     }
 
-    /// σ⁰ of some pixels (row, column), exactly.
+    /// Exact σ⁰ of some pixels (row, column).
     #[must_use]
     pub fn sigma0_pixels(&self, fields: &FacetFields<'_>, pixels: &[[usize; 2]]) -> Vec<f32> {
         let columns = fields.slope_x.columns;
@@ -160,8 +159,8 @@ impl Backscatter {
 
     /// Change of σ⁰ without each of its terms, over resolved Gaussian slopes.
     ///
-    /// The specular return has a closed form. The tilt average is taken away on three by three Gauss–Hermite nodes
-    /// of the resolved slopes: within 10 % at 32°, a third too low at 18°, where few facets near nadir dominate.
+    /// The specular return has a closed form. The tilt average is removed on three by three Gauss–Hermite nodes of the
+    /// resolved slopes: accurate within 10 % at 32°, a third too low at 18°, where few facets near nadir dominate.
     #[must_use]
     pub fn sensitivity(&self, resolved: &SlopeCovariance) -> Sensitivity {
         let mean = self.mean_over(resolved);
@@ -192,14 +191,14 @@ impl Backscatter {
     }
 }
 
-/// Nodes and weights of the mean over a unit Gaussian, exact to the fifth power: 0 and ±√3.
+/// Nodes and weights of the mean over a unit Gaussian, exact to degree five: 0 and ±√3.
 const HERMITE_3: [[f64; 2]; 3] = [
     [-1.7320508075688772, 1.0 / 6.0],
     [0.0, 2.0 / 3.0],
     [1.7320508075688772, 1.0 / 6.0],
 ];
 
-/// Gates against tables of other programmes and an empirical model.
+/// Comparisons with tables of other programs and with an empirical model.
 #[cfg(test)]
 #[allow(
     clippy::float_cmp,
@@ -238,7 +237,7 @@ mod tests {
     };
 
     impl Case {
-        /// The mean over a whole developed sea, waves longer than the split as Gaussian slopes.
+        /// Mean over a fully developed sea, with waves longer than the split as Gaussian slopes.
         fn scene_mean(&self) -> Backscatter {
             let incidence = self.degrees.to_radians();
             let permittivity = sea_water(self.frequency, 20.0, 35.0);
@@ -258,7 +257,7 @@ mod tests {
             }
         }
 
-        /// Bragg without tilt, with tilt, specular and sum \[dB\].
+        /// Bragg without tilt, with tilt, specular and total return \[dB\].
         fn decibels(&self) -> [f64; 4] {
             let model = self.scene_mean();
             let [bragg, specular] = model.parts([0.0; 2]);
@@ -267,7 +266,7 @@ mod tests {
         }
     }
 
-    /// Values of our own second implementation, `tests/reference/scattering.py`, rounded to 0.001 dB.
+    /// Values from the independent implementation `tests/reference/scattering.py`, rounded to 0.001 dB.
     const ROUNDED: f64 = 6e-4;
 
     #[test]
@@ -297,7 +296,7 @@ mod tests {
         }
     }
 
-    /// Bragg, two-scale, specular, sum.
+    /// Bragg, two-scale, specular and total returns.
     #[test]
     fn x_band_parts_meet_the_reference() {
         let table = [
@@ -326,8 +325,8 @@ mod tests {
         }
     }
 
-    /// What a slope variance of one direction changes the Bragg return by \[dB\], in the look direction and across it: the same
-    /// programme, upwind, 5 m/s.
+    /// Change of the Bragg return by a slope variance along one axis \[dB\], in the look direction and across it: the same
+    /// program, upwind, 5 m/s.
     #[test]
     fn more_slopes_change_the_return_as_in_the_reference() {
         use Polarization::{HH, VV};
@@ -397,8 +396,8 @@ mod tests {
         assert!(farthest < 0.006, "{farthest}");
     }
 
-    /// Two-scale, 3 m/s, 16°: many facets come within reach of nadir, where the two scales part by choice. A sharp limit
-    /// at `k_d` gives −4.3 dB instead of −3.7 dB, and the specular return is 4 dB above both.
+    /// Two-scale, 3 m/s, 16°: many facets come near nadir, where the split between the two scales is arbitrary. A sharp
+    /// limit at `k_d` gives −4.3 dB instead of −3.7 dB, and the specular return is 4 dB above both.
     #[test]
     fn bragg_near_nadir_depends_on_where_the_scales_part() {
         let case = Case {
@@ -411,7 +410,7 @@ mod tests {
         assert!(specular > bragg + 4.0);
     }
 
-    /// The external gate: CMOD5.N within 2.5 dB from 30 to 40°, 3 to 10 m/s, up- and crosswind.
+    /// Agreement with CMOD5.N within 2.5 dB from 30 to 40°, 3 to 10 m/s, up- and crosswind.
     #[test]
     fn cmod5n_agrees_at_c_band() {
         for wind_speed in [3.0, 5.0, 7.0, 10.0] {
@@ -434,8 +433,8 @@ mod tests {
         }
     }
 
-    /// The gate at 45°: within 0.6 dB upwind; across the wind too bright by 1.2 to 2.5 dB, as the spectrum spreads too many of its
-    /// short waves there in a strong wind.
+    /// At 45°: within 0.6 dB upwind; crosswind too bright by 1.2 to 2.5 dB, as the spectrum spreads too many of its short
+    /// waves across a strong wind.
     #[test]
     fn crosswind_at_forty_five_degrees_is_above_cmod5n() {
         for wind_speed in [3.0, 5.0, 7.0, 10.0] {
@@ -455,8 +454,8 @@ mod tests {
         }
     }
 
-    /// Exponent of the wind in σ⁰ upwind between 3 and 5 m/s: half of CMOD5.N's at 35°, nine tenths at 45°. Near k = 130 rad/m the
-    /// long waves' tail, which hardly follows the wind, is as high as the short waves.
+    /// Exponent of the wind in σ⁰ upwind between 3 and 5 m/s: half of CMOD5.N's at 35°, nine tenths at 45°. Near k = 130
+    /// rad/m the tail of the long waves, which hardly depends on the wind, is as high as the short waves.
     #[test]
     fn the_wind_exponent_is_that_of_cmod5n_at_forty_five_degrees_alone() {
         for (degrees, low, high) in [(35.0, 0.4, 0.6), (40.0, 0.6, 0.85), (45.0, 0.85, 1.0)] {
@@ -474,8 +473,8 @@ mod tests {
         }
     }
 
-    /// The gate at 20°: within 2.5 dB upwind; crosswind a known weakness, too low by up to 4.7 dB, as the spectrum has
-    /// too few long waves across the wind for the specular return.
+    /// At 20°: within 2.5 dB upwind; crosswind too low by up to 4.7 dB, a known weakness, as the spectrum has too few long
+    /// waves across the wind for the specular return.
     #[test]
     fn crosswind_at_twenty_degrees_is_below_cmod5n() {
         for wind_speed in [3.0, 5.0, 7.0, 10.0] {
@@ -498,7 +497,7 @@ mod tests {
         }
     }
 
-    /// VV over HH of the tilted Bragg return at X band, 5 m/s: within 0.3 dB of the reference.
+    /// VV/HH ratio of the tilted Bragg return at X band, 5 m/s: within 0.3 dB of the reference.
     #[test]
     fn polarization_ratio_meets_the_reference() {
         for (degrees, expected) in [
@@ -538,8 +537,8 @@ mod tests {
         }
     }
 
-    /// A pixel that resolves part of the slopes: the mean over those of the facets' σ⁰ is the mean over all, and
-    /// the figures of the plan agree with quadrature over resolved slopes.
+    /// A pixel that resolves part of the slopes: the mean of facet σ⁰ over these equals the mean over all slopes, and the
+    /// plan's estimates agree with quadrature over resolved slopes.
     #[test]
     fn resolved_and_unresolved_slopes_make_the_whole() {
         for degrees in [18.0, 32.0] {
@@ -581,7 +580,7 @@ mod tests {
         }
     }
 
-    /// Nothing is lost from nothing.
+    /// A calm sea has no sensitivity to any term.
     #[test]
     fn calm_sea_has_no_sensitivity() {
         let model = Case {

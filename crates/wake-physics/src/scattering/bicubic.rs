@@ -25,7 +25,7 @@ impl Bicubic {
         }
     }
 
-    /// The value at a point; `None` less than one cell from the edge of the lattice, and outside it.
+    /// The value at a point; `None` outside the lattice or less than one cell from its edge.
     #[inline(always)]
     pub(crate) fn at(&self, [u, v]: [f64; 2]) -> Option<f64> {
         let (i, s) = cell((u - self.start[0]) * self.inverse_step, self.nodes[0])?;
@@ -46,7 +46,7 @@ impl Bicubic {
 #[inline(always)]
 fn cell(position: f64, nodes: usize) -> Option<(usize, f64)> {
     if position >= 1.0 && position <= nodes as f64 - 2.0 {
-        // The last admitted position is the right end of the last cell.
+        // The last valid position is the right end of the last cell.
         let node = (position as usize).min(nodes - 3);
         return Some((node - 1, position - node as f64));
     }

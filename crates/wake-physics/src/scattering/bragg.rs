@@ -1,4 +1,4 @@
-//! Bragg scattering: the return of the one short wave that fits the radar's wavelength.
+//! Bragg scattering: the return of the short wave that resonates with the radar's wavelength.
 
 use num_complex::Complex64;
 use std::f64::consts::PI;
@@ -39,7 +39,7 @@ pub fn coefficients(permittivity: Complex64, cos_incidence: f64) -> Coefficients
     }
 }
 
-/// Principal square root of a number with positive imaginary part, without the sines of the general one.
+/// Principal square root of a number with positive imaginary part, without the trigonometry of the general one.
 #[inline(always)]
 fn square_root(z: Complex64) -> Complex64 {
     let re = (0.5 * (z.norm_sqr().sqrt() + z.re)).sqrt();
@@ -79,7 +79,7 @@ mod tests {
     use crate::constants::SPEED_OF_LIGHT;
     use crate::permittivity::sea_water;
 
-    /// |g|² and `k_B` by our own second implementation, `tests/reference/sea_and_scattering.py`, at 9.6 GHz, 20 °C, 35 psu.
+    /// |g|² and `k_B` from the independent implementation `tests/reference/sea_and_scattering.py`, at 9.6 GHz, 20 °C, 35 psu.
     #[test]
     fn coefficients_meet_the_reference() {
         let table = [
@@ -101,7 +101,7 @@ mod tests {
         }
     }
 
-    /// At nadir both are the reflection coefficient (√ε − 1)/(√ε + 1), and a metal has |`g_HH`| = 1,
+    /// At nadir both equal the reflection coefficient (√ε − 1)/(√ε + 1); for a metal |`g_HH`| = 1 and
     /// |`g_VV`| = (1 + sin²θ)/cos²θ.
     #[test]
     fn limits_of_the_coefficients() {

@@ -1,12 +1,12 @@
-//! What breaking waves add to the Bragg return, the same in both polarizations.
+//! Return of breaking waves, added to the Bragg return and equal in both polarizations.
 //!
 //! ```text
 //! σ_b(θ) = q [sec⁴θ/s² exp(−tan²θ/s²) + ε/s²],     s² = 0.19, ε = 0.005
 //! q      = 0.006 (U₁₀/5)^1.3
 //! ```
 //!
-//! Form and s², ε: Kudryavtsev, Hauser, Caudal and Chapron (2003), J. Geophys. Res. 108, as others have coded it. The law
-//! of q is fitted to what CMOD5.N has more than two-scale Bragg scattering at 35° upwind; its exponent is chosen.
+//! Form and s², ε: Kudryavtsev, Hauser, Caudal and Chapron (2003), J. Geophys. Res. 108, as implemented by others. The law
+//! of q is fitted to the excess of CMOD5.N over two-scale Bragg scattering at 35° upwind; its exponent is chosen.
 
 use crate::constants::{GRAVITY, VON_KARMAN};
 use crate::dispersion::angular_frequency;
@@ -15,7 +15,7 @@ use crate::spectrum::elfouhaily::{DragLaw, friction_velocity};
 /// Mean square slope of breakers s² \[1\].
 const SLOPE: f64 = 0.19;
 
-/// Return of breakers that is the same at all angles, ε \[1\].
+/// Isotropic part of the breakers' return, ε \[1\].
 const ALL_ANGLES: f64 = 0.005;
 
 /// Density of air over that of water: 1.25 over 1025 kg/m³.
@@ -24,16 +24,16 @@ const AIR_OVER_WATER: f64 = 1.25 / 1025.0;
 /// Kinematic viscosity of air [m²/s], at 15 °C.
 const VISCOSITY_OF_AIR: f64 = 1.47e-5;
 
-/// Power n of the breaking of waves in their energy: n + 1 = 6 of a change of steepness becomes one of breaking.
+/// Exponent n of breaking in the wave energy: a relative change of steepness changes breaking n + 1 = 6 times as much.
 const BREAKING_POWER: f64 = 5.0;
 
-/// Steepness of the action spectrum of the waves that break, as others have coded it: 9/2, of a spectrum k⁻⁴.
+/// Steepness of the action spectrum of the breaking waves, as implemented by others: 9/2, for a spectrum k⁻⁴.
 const STEEPNESS: f64 = 4.5;
 
-/// Share of σ⁰ that comes from breaking waves in VV and HH where the edges of a wake are concerned: chosen.
+/// Share of σ⁰ due to breaking waves in VV and HH at the edges of a wake: chosen.
 pub(crate) const SHARE: [f64; 2] = [0.2, 0.4];
 
-/// σ⁰ of breaking waves over the share q of the sea they cover \[1\].
+/// σ⁰ of breaking waves over the share q of the sea that they cover \[1\].
 ///
 /// - `incidence` θ \[rad\]
 #[must_use]
@@ -63,7 +63,7 @@ pub fn backscatter(incidence: f64, wind_speed: f64) -> f64 {
     coverage(wind_speed) * of_coverage(incidence)
 }
 
-/// Response `T_b` \[s\] of the return of breaking waves to a divergence.
+/// Response time `T_b` \[s\] of the return of breaking waves to a divergence.
 ///
 /// ```text
 /// T_b = (n + 1) · 4.5 · ½/μ(k_b),     n = 5, k_b = min(k_e/10, 2π/0.3 m)
@@ -80,7 +80,7 @@ pub fn response_time(radar_wavenumber: f64, wind_speed: f64) -> f64 {
     0.5 * (BREAKING_POWER + 1.0) * STEEPNESS / rate
 }
 
-/// Rate at which the waves that break take energy from the wind, μ [1/s].
+/// Rate at which breaking waves gain energy from the wind, μ [1/s].
 ///
 /// ```text
 /// μ = 2 C (u*/c)² ω,     C = 1.5 (ρ_a/ρ_w) [ln(π/(k z₀))/κ − c/u*],  at least 0
@@ -88,16 +88,16 @@ pub fn response_time(radar_wavenumber: f64, wind_speed: f64) -> f64 {
 ///
 /// - `wavenumber` k [rad/m]; `friction_velocity` u* [m/s]
 ///
-/// # Why it is not the relaxation rate of the Bragg waves
+/// # Difference from the relaxation rate of the Bragg waves
 ///
-/// That rate, 0.04 (u*/c)² ω, was measured where u*/c is 0.1 to 3. The waves that break are 0.3 m long and longer, and run
-/// almost as fast as the wind over them: at L band u*/c is 0.05 to 0.09 in winds of 3 to 5 m/s. Their own speed reduces what
-/// they take from the wind, by the term −c/u*, which the other law does not have: it is 0.7 times this rate at 5 to 10 m/s
+/// That rate, 0.04 (u*/c)² ω, was measured where u*/c is 0.1 to 3. The breaking waves are at least 0.3 m long and travel
+/// almost as fast as the wind above them: at L band u*/c is 0.05 to 0.09 in winds of 3 to 5 m/s. Their own speed reduces
+/// the energy they gain, by the term −c/u*, which the other law lacks: that law gives 0.7 times this rate at 5 to 10 m/s
 /// and 1.8 times at 3 m/s (L band). The friction velocity is the same.
 ///
 /// # References
 ///
-/// Kudryavtsev et al. (2005), J. Geophys. Res. 110, as others have coded it.
+/// Kudryavtsev et al. (2005), J. Geophys. Res. 110, as implemented by others.
 #[must_use]
 pub fn growth_rate(wavenumber: f64, friction_velocity: f64) -> f64 {
     let omega = angular_frequency(wavenumber, f64::INFINITY);
@@ -123,7 +123,7 @@ mod tests {
         TAU * frequency / crate::constants::SPEED_OF_LIGHT
     }
 
-    /// Values of the bracket computed elsewhere, to the digits printed.
+    /// Values of the bracket computed by another program, to the printed digits.
     #[test]
     fn return_over_coverage() {
         for (degrees, expected, rounding) in
@@ -132,7 +132,7 @@ mod tests {
             let value = of_coverage(f64::to_radians(degrees));
             assert!((value - expected).abs() < rounding, "{degrees}: {value}");
         }
-        // Straight down: 1/s² + ε/s².
+        // At nadir: 1/s² + ε/s².
         assert!((of_coverage(0.0) - 1.005 / 0.19).abs() < 1e-12);
     }
 
@@ -153,8 +153,8 @@ mod tests {
         assert!((with(-21.0) + 18.7).abs() < 0.1, "{}", with(-21.0));
     }
 
-    /// μ of the Bragg waves at 35° and `T_b`, as computed elsewhere from the same formulas; the density of air and the
-    /// roughness of theirs are not stated: 4 %, and half a unit of the last digit.
+    /// μ of the Bragg waves at 35° and `T_b`, computed by another program from the same formulas, whose air density and
+    /// roughness are not stated: within 4 % and half a unit of the last digit.
     #[test]
     fn rates_and_responses_as_tabulated() {
         for (k, rates) in [
@@ -187,7 +187,7 @@ mod tests {
     }
 
     /// The wind of the logarithmic profile over this roughness, u*/κ ln(10 m/z₀), is the one whose drag law gave u*: one
-    /// friction velocity does for both, within 1 % where the coverage was fitted.
+    /// friction velocity serves both, within 1 % where the coverage was fitted.
     #[test]
     fn the_friction_velocity_has_the_profile_of_the_roughness() {
         for wind in [5.0, 7.0, 10.0] {

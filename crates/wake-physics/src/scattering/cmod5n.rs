@@ -1,4 +1,4 @@
-//! CMOD5.N, an empirical model of C-band VV backscatter: an oracle from outside.
+//! CMOD5.N, an empirical model of C-band VV backscatter, as an external reference.
 
 /// Coefficients c1 to c28 (Hersbach 2010).
 const C: [f64; 28] = [
@@ -7,7 +7,7 @@ const C: [f64; 28] = [
     6.2437, 2.3893, 0.3249, 4.1590, 1.6930,
 ];
 
-/// σ⁰ of the sea at C band (5.3 GHz), VV, by CMOD5.N: fitted to satellite scatterometers, without physics.
+/// σ⁰ of the sea at C band (5.3 GHz), VV, by CMOD5.N: an empirical fit to satellite scatterometers.
 ///
 /// - `v` neutral wind speed at 10 m \[m/s\], 1 to 30
 /// - `phi` angle between the look direction and upwind \[rad\]
@@ -55,7 +55,7 @@ fn second_harmonic(v: f64, x: f64) -> f64 {
     (d2 * v2 - d1) * (-v2).exp()
 }
 
-/// Values in dB at 0, 90 and 180° from upwind by our own second implementation with the same published coefficients,
+/// Values in dB at 0, 90 and 180° from upwind by an independent implementation with the same published coefficients,
 /// `tests/reference/scattering.py`, rounded to 0.001 dB.
 #[test]
 fn cmod5n_meets_the_reference() {

@@ -5,10 +5,10 @@ use crate::scattering::slope_lattice::{SlopeLattice, radius};
 use crate::scattering::slopes::PrincipalAxes;
 use crate::scattering::table_error::{Weights, interpolation_error};
 
-/// Finest lattice on which averages are taken, in parts of the spacing of facets.
+/// Largest refinement of the lattice on which averages are taken, relative to the facet spacing.
 const MOST_REFINEMENT: usize = 16;
 
-/// Bragg return of plane facets on a lattice of slopes, with what is needed to average it.
+/// Bragg return of plane facets on a lattice of slopes, with the parameters of the average.
 pub(super) struct Facets {
     pub(super) lattice: SlopeLattice,
     pub(super) std: [f64; 2],
@@ -16,7 +16,7 @@ pub(super) struct Facets {
 }
 
 impl Facets {
-    /// Facets over a range of slopes and as far beyond as their average reaches.
+    /// Samples facets over a range of slopes, extended by the reach of the average.
     pub(super) fn sample(
         backscatter: &Backscatter,
         axes: &PrincipalAxes,
@@ -25,7 +25,7 @@ impl Facets {
     ) -> Self {
         let std = axes.variance.map(f64::sqrt);
         let radius = std.map(|s| radius(s, spacing));
-        // Three nodes beyond the range at each end, and an odd number, so that every other node spans it too.
+        // Three nodes beyond the range at each end, and an odd number in total, so that every other node spans it too.
         let cells = range.map(|[first, last]| ((last - first) / (2.0 * spacing)).ceil() as usize);
         let nodes = [0, 1].map(|a| 2 * cells[a] + 7 + 2 * radius[a]);
         let start = [0, 1].map(|a| range[a][0] - spacing * (3 + radius[a]) as f64);
@@ -40,7 +40,7 @@ impl Facets {
         }
     }
 
-    /// The average over tilt on a lattice fine enough for an interpolation of this error, if there is one.
+    /// The tilt average on a lattice fine enough for the given interpolation error, if one exists.
     pub(super) fn averaged(&self, error: f64, weights: &Weights, most_nodes: usize) -> Average {
         let lattice = self.lattice.smoothed(self.std, self.radius, 1);
         let largest = lattice.values.iter().fold(0.0f64, |a, b| a.max(b.abs()));
@@ -63,7 +63,7 @@ impl Facets {
         average
     }
 
-    /// The error of the averages, from the largest difference that leaving out every other facet makes.
+    /// Error of the averages, from the largest difference made by leaving out every other facet.
     pub(super) fn averaging_error(
         &self,
         average: &SlopeLattice,
@@ -90,13 +90,13 @@ pub(super) struct Average {
     pub(super) lattice: SlopeLattice,
     /// Largest value.
     pub(super) largest: f64,
-    /// Stated error of the averages and of their interpolation.
+    /// Stated total error of the averages and their interpolation.
     pub(super) error: f64,
 }
 
 impl Average {
-    /// Factor on the spacing of facets that should bring the error down to `error`: ln(error/largest) is taken as
-    /// inverse to the spacing.
+    /// Factor on the facet spacing that should reduce the error to `error`, assuming that ln(error/largest) is inversely
+    /// proportional to the spacing.
     pub(super) fn next_spacing(&self, error: f64) -> f64 {
         let factor = (self.error / self.largest).ln() / (error / self.largest).ln();
         if factor > 0.0 {

@@ -1,22 +1,21 @@
-//! Hydrodynamic modulation: long waves gather and thin out the short waves that the radar sees.
+//! Hydrodynamic modulation: long waves concentrate and thin out the short waves that scatter.
 //!
 //! The modulation m is a field linear in the long waves, [`Quantity::Hydrodynamic`](crate::waves::Quantity).
-//! Here are the rate at which the short waves recover, how strongly they answer, and the factor by which m changes the
-//! Bragg return.
-//! Tilt is no part of it: that is in the facet's slope.
+//! This module has the relaxation rate of the short waves, the strength of their response, and the factor by which m
+//! changes the Bragg return. Tilt is not included: it is part of the facet's slope.
 
 use crate::dispersion::angular_frequency;
 use crate::raster::Field;
 use crate::spectrum::Elfouhaily;
 use rayon::prelude::*;
 
-/// Step in ln k of the difference that gives the action slope \[1\].
+/// Step in ln k of the finite difference for the action slope \[1\].
 const STEP: f64 = 1e-3;
 
-/// Slowest and fastest relaxation admitted [1/s], the range of a scene's `radar.relaxation_rate`.
+/// Lowest and highest relaxation rate allowed [1/s], the range of a scene's `radar.relaxation_rate`.
 pub(crate) const RELAXATION_RANGE: [f64; 2] = [0.01, 100.0];
 
-/// Rate at which the Bragg waves return to equilibrium with the wind, taken as their rate of growth.
+/// Rate at which the Bragg waves relax to equilibrium with the wind, taken as their growth rate.
 ///
 /// ```text
 /// μ = 0.04 (u*/c_B)² ω_B,  clamped to 0.01…100 1/s
@@ -27,8 +26,8 @@ pub(crate) const RELAXATION_RANGE: [f64; 2] = [0.01, 100.0];
 ///
 /// # Validity
 ///
-/// Growth was measured for u*/c from 0.1 to 3, along the wind; the angle between wind and wave is left out, and
-/// so is the loss to viscosity, which exceeds the growth at the lowest winds: hence the lower clamp.
+/// Growth was measured for u*/c from 0.1 to 3, along the wind. The angle between wind and wave is neglected, as is viscous
+/// dissipation, which exceeds the growth at the lowest winds: hence the lower clamp.
 ///
 /// # References
 ///
@@ -41,17 +40,17 @@ pub fn relaxation_rate(friction_velocity: f64, bragg_wavenumber: f64) -> f64 {
     growth.clamp(RELAXATION_RANGE[0], RELAXATION_RANGE[1])
 }
 
-/// Slope of the action spectrum of the Bragg waves, by which they answer to a strain of the current.
+/// Slope of the action spectrum of the Bragg waves, which determines their response to a strain of the current.
 ///
 /// ```text
 /// m_B = −∂ln N/∂ln k  at k_B,     N = ω Ψ/k
 /// ```
 ///
 /// - `spectrum` of the short waves; `bragg_wavenumber` `k_B` [rad/m], above 0
-/// - `wind` unit vector (x, y) of where the wind blows to; Bragg waves run along x
+/// - `wind` unit vector (x, y) of the wind direction (toward); the Bragg waves travel along x
 /// - returns `m_B` \[1\], 3.8 to 5.3 from L to X band at 3 to 10 m/s; 0 where there are no short waves
 ///
-/// A spectrum Ψ ∝ k⁻⁴ of gravity waves has 4.5.
+/// For gravity waves, a spectrum Ψ ∝ k⁻⁴ has 4.5.
 ///
 /// # References
 ///
@@ -67,16 +66,16 @@ pub fn action_slope(spectrum: &Elfouhaily, bragg_wavenumber: f64, wind: [f64; 2]
     if slope.is_finite() { slope } else { 0.0 }
 }
 
-/// Turns modulations m into factors on the Bragg return \[1\], in place.
+/// Converts modulations m into factors on the Bragg return \[1\], in place.
 ///
 /// ```text
 /// exp(m − ½ var m)
 /// ```
 ///
-/// The theory is linear in m; the exponential agrees with 1 + m to first order, has no fewer short waves than none, and for
-/// a Gaussian m the mean 1.
+/// The theory is linear in m. The exponential agrees with 1 + m to first order, is never negative, and has the mean 1 for
+/// Gaussian m.
 ///
-/// - `variance` var m of the sea
+/// - `variance` of m over the sea
 pub(crate) fn to_bragg_factors(modulation: &mut Field, variance: f64) {
     let half = (0.5 * variance) as f32;
     let values = modulation.values.par_iter_mut().with_min_len(1 << 14);
@@ -92,8 +91,8 @@ mod tests {
     use super::*;
     use crate::spectrum::elfouhaily::{DragLaw, FULLY_DEVELOPED};
 
-    /// By hand at k = 213.24 rad/m: ω = √(9.80665·213.24 + 7.2e-5·213.24³) = 52.8139 rad/s,
-    /// c = 0.247673 m/s; u* = 0.2 m/s gives 0.04·0.652084·52.8139 = 1.37756 1/s.
+    /// Worked out by hand at k = 213.24 rad/m: ω = √(9.80665·213.24 + 7.2e-5·213.24³) = 52.8139 rad/s, c = 0.247673 m/s; u*
+    /// = 0.2 m/s gives 0.04·0.652084·52.8139 = 1.37756 1/s.
     #[test]
     fn growth_by_hand() {
         assert!((relaxation_rate(0.2, 213.24) - 1.37756).abs() < 1e-5);
@@ -107,13 +106,13 @@ mod tests {
         assert_eq!(relaxation_rate(50.0, 200.0), 100.0);
     }
 
-    /// Normal numbers by their quantiles: the mean of the factors is 1, whatever the variance; all are positive, and small
-    /// modulations are 1 + m.
+    /// Averages over a normal density: the mean factor is 1 for any variance, all factors are positive, and for small
+    /// modulations the factor is 1 + m.
     #[test]
     fn factors_have_the_mean_one() {
         let count = 1 << 16;
         for deviation in [0.05f64, 0.3, 0.8] {
-            // Sum of twelve uniform numbers on a lattice of quantiles would be slow; a midpoint rule of the density is exact.
+            // The midpoint rule over the density is accurate here, and faster than samples.
             let raster = crate::Raster::image(1, count, 1.0);
             let at = |j: usize| 8.0 * ((j as f64 + 0.5) / count as f64 * 2.0 - 1.0);
             let mut field = Field::from_fn(&raster, |_, j| (deviation * at(j)) as f32);
@@ -125,7 +124,7 @@ mod tests {
                 norm += weight;
                 assert!(factor > 0.0);
             }
-            // Rounding of f32 numbers; the density ends at 8 deviations.
+            // Rounding of f32 numbers; the density is cut at 8 standard deviations.
             assert!(
                 (mean / norm - 1.0).abs() < 1e-6,
                 "{deviation}: {}",
@@ -137,8 +136,8 @@ mod tests {
         assert!((small.values[0] - 1.001).abs() < 1e-6);
     }
 
-    /// The table of the reference at 35° for winds of 3, 5, 7, 10 m/s of a fully developed
-    /// sea, upwind, with two decimals: computed by another program from the same spectrum.
+    /// The reference table at 35° for winds of 3, 5, 7, 10 m/s over a fully developed sea, upwind, to two decimals:
+    /// computed by another program from the same spectrum.
     #[test]
     fn the_action_slope_is_that_of_the_table() {
         for (frequency, expected) in [
@@ -152,7 +151,7 @@ mod tests {
             for (wind_speed, value) in [3.0, 5.0, 7.0, 10.0].into_iter().zip(expected) {
                 let spectrum = Elfouhaily::of_age(wind_speed, FULLY_DEVELOPED, DragLaw::Wu);
                 let found = action_slope(&spectrum, bragg, [1.0, 0.0]);
-                // Half a unit of the last decimal given.
+                // Half a unit of the last digit.
                 assert!(
                     (found - value).abs() <= 0.005,
                     "{frequency:.2e} Hz, {wind_speed} m/s: {found} {value}"
@@ -161,7 +160,7 @@ mod tests {
         }
     }
 
-    /// Without wind there are no short waves, and nothing to modulate.
+    /// Without wind there are no short waves to modulate.
     #[test]
     fn no_short_waves_have_no_action_slope() {
         assert_eq!(

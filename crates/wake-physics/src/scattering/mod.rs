@@ -4,12 +4,12 @@
 //! σ⁰ = σ_Bragg(slope) · exp(m − ½ var m) · remaining + σ_specular(slope)
 //! ```
 //!
-//! Waves come in three bands. Those a pixel resolves tilt its facet. Those between the pixel and the radar's
-//! split wavenumber `k_d` are averaged over, as Gaussian slopes. Those shorter than `k_d` scatter (Bragg).
-//! The tilt lives in `σ_Bragg` and nowhere else; m is the hydrodynamic modulation alone.
+//! Waves are divided into three bands. Waves resolved by a pixel tilt its facet. Waves between the pixel and the radar's
+//! split wavenumber `k_d` are averaged over, as Gaussian slopes. Waves shorter than `k_d` scatter (Bragg). Tilt enters only
+//! through `σ_Bragg`; m is the hydrodynamic modulation alone.
 //!
-//! Linear units, per unit area of the horizontal plane. The radar looks toward +x, so a slope ∂ζ/∂x > 0, which
-//! rises away from the radar, faces it and is bright.
+//! Values are linear, per unit area of the horizontal plane. The radar looks toward +x, so a slope ∂ζ/∂x > 0, which rises
+//! away from the radar, faces it and is bright.
 
 pub mod bragg;
 pub mod breaking;

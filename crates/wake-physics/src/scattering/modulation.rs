@@ -1,6 +1,7 @@
-//! Modulation transfer functions: how strongly each wave modulates the image, to first order in its height.
+//! Modulation transfer functions: modulation of the image by each wave, to first order in its height.
 //!
-//! A plan weighs terms by these functions, and the spectrum of open sea follows from them; they never make the image of a scene.
+//! The plan weighs terms by these functions, and they give the image spectrum of open sea; they never enter a scene's
+//! image.
 
 use crate::waves::{Quantity, Transfer};
 use num_complex::Complex64;
@@ -9,7 +10,7 @@ use std::f64::consts::PI;
 /// Modulation transfer function of a radar and a sea, linearised about the calm surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModulationTransfer {
-    /// Orbital motion and modulation of a wave.
+    /// Transfer from amplitudes to orbital motion and modulation.
     pub transfer: Transfer,
     /// ∂ln σ⁰/∂slope along x and y.
     pub tilt: [f64; 2],
@@ -22,13 +23,13 @@ pub struct ModulationTransfer {
 /// Relative modulation of the intensity by a wave of unit height, effect by effect [1/m].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Modulation {
-    /// Slopes turn facets toward the radar.
+    /// Modulation by slopes, which tilt facets toward the radar.
     pub tilt: Complex64,
-    /// Currents modulate the Bragg waves.
+    /// Modulation of the Bragg waves by currents.
     pub hydrodynamic: Complex64,
-    /// Layover compresses what rises away from the radar.
+    /// Compression by layover where the surface rises away from the radar.
     pub range_bunching: Complex64,
-    /// Velocities gather and spread echoes in azimuth.
+    /// Concentration and dilution of echoes in azimuth by velocities.
     pub bunching: Complex64,
 }
 
@@ -64,7 +65,7 @@ impl ModulationTransfer {
     }
 }
 
-/// Factor by which a Gaussian exp(−(πy/ρ)²) of azimuth resolution ρ damps a wave: exp(−(kyρ/2π)²).
+/// Factor on a wave's amplitude by a Gaussian exp(−(πy/ρ)²) of azimuth resolution ρ: exp(−(kyρ/2π)²).
 #[must_use]
 pub fn smear(ky: f64, resolution: f64) -> f64 {
     (-(ky * resolution / (2.0 * PI)).powi(2)).exp()
@@ -88,7 +89,7 @@ mod tests {
         }
     }
 
-    /// The smear of a wave is the Fourier integral of the normalised kernel.
+    /// The smear of a wave equals the Fourier integral of the normalised kernel.
     #[test]
     fn smear_is_the_transform_of_the_kernel() {
         let (ky, rho) = (0.12, 30.0);
@@ -102,7 +103,7 @@ mod tests {
         assert!((sum / norm - smear(ky, rho)).abs() < 1e-9);
     }
 
-    /// Waves along range are not bunched; waves along azimuth are neither tilted (for an even σ⁰) nor laid over.
+    /// Waves along range are not bunched; waves along azimuth have neither tilt modulation (for an even σ⁰) nor layover.
     #[test]
     fn each_effect_has_its_direction() {
         let m = transfer().at([0.2, 0.0], 1.4);

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
-/// Values at the nodes `start + step·(i, j)`, the first coordinate running fastest.
+/// Values at the nodes `start + step·(i, j)`, with the first index varying fastest.
 #[derive(Debug, Clone)]
 pub(crate) struct SlopeLattice {
     pub start: [f64; 2],
@@ -15,7 +15,7 @@ pub(crate) struct SlopeLattice {
 impl SlopeLattice {
     /// Samples a function, row by row in parallel.
     ///
-    /// - `fill`: its values in a row, from coordinates of the row's first node on
+    /// - `fill`: writes the values of a row, given the coordinates of its first node
     pub(crate) fn of_rows(
         start: [f64; 2],
         step: f64,
@@ -50,7 +50,7 @@ impl SlopeLattice {
         })
     }
 
-    /// Coordinates of node `n`, counted as the values are.
+    /// Coordinates of node `n`, in the order of the values.
     pub(crate) fn place(&self, n: usize) -> [f64; 2] {
         let [i, j] = [n % self.nodes[0], n / self.nodes[0]];
         [
@@ -75,9 +75,9 @@ impl SlopeLattice {
     }
 
     /// Mean over independent Gaussian shifts of standard deviations `std` along the two coordinates, on a lattice
-    /// `refinement` times finer (1 where a standard deviation is below the step).
+    /// `refinement` times finer (1 if a standard deviation is below the step).
     ///
-    /// `radius` nodes at each end of a coordinate, at least [`radius`]'s, are used up.
+    /// The result loses `radius` nodes at each end of a coordinate, which must be at least [`radius`].
     pub(crate) fn smoothed(&self, std: [f64; 2], radius: [usize; 2], refinement: usize) -> Self {
         let bases = [0, 1].map(|a| self.nodes[a] - 2 * radius[a]);
         let nodes = bases.map(|b| (b - 1) * refinement + 1);
@@ -101,7 +101,7 @@ impl SlopeLattice {
     }
 }
 
-/// Nodes on either side that the mean over a Gaussian of standard deviation `std` needs: even, so that every
+/// Nodes on either side needed for the mean over a Gaussian of standard deviation `std`. The number is even, so that every
 /// other node serves for twice the step.
 pub(crate) fn radius(std: f64, step: f64) -> usize {
     if std <= 0.0 {
@@ -110,12 +110,14 @@ pub(crate) fn radius(std: f64, step: f64) -> usize {
     2 * (0.5 * (6.0 * std / step + 1.0)).max(2.0).ceil() as usize
 }
 
-/// Weights of a Gaussian mean at a node and at the points that divide the step after it.
+/// Weights of a Gaussian mean at a node and at the points that subdivide the following step.
 struct Phases {
     weights: Vec<Vec<f64>>,
 }
 
 impl Phases {
+    /// Weights for every subdivision of a step.
+    ///
     /// - `ratio` standard deviation over step
     fn new(ratio: f64, radius: usize, refinement: usize) -> Self {
         let phase = |r: usize| weights(ratio, radius, r as f64 / refinement as f64);
@@ -124,7 +126,7 @@ impl Phases {
         }
     }
 
-    /// The mean along a row, from `bases` nodes.
+    /// Mean along a row, from `bases` nodes.
     fn smooth_row(&self, row: &[f64], bases: usize, out: &mut [f64]) {
         let refinement = self.weights.len();
         let mut sums = vec![0.0; bases];
@@ -139,7 +141,7 @@ impl Phases {
         }
     }
 
-    /// The mean across rows as long as `out`, at refined row `j`.
+    /// Mean across rows of the length of `out`, at refined row `j`.
     fn sum_rows(&self, rows: &[f64], j: usize, out: &mut [f64]) {
         let (base, phase) = (j / self.weights.len(), j % self.weights.len());
         let rows = rows[base * out.len()..].chunks(out.len());
@@ -155,12 +157,12 @@ fn add(sums: &mut [f64], weight: f64, values: &[f64]) {
     }
 }
 
-/// Weights of 2·`radius` + 1 nodes for the mean over a Gaussian of standard deviation `ratio` steps, centred
-/// `offset` steps after the middle node.
+/// Weights of 2·`radius` + 1 nodes for the mean over a Gaussian of standard deviation `ratio` steps, centred `offset` steps
+/// after the middle node.
 ///
-/// Samples of the Gaussian where the step resolves it (the trapezoid rule, exact to e^{−2π²} = 3e-9 of the
-/// sharpest function the lattice carries); else, without offset, the five weights that have the moments 1, σ²,
-/// 3σ⁴ of the Gaussian and are exact for polynomials of degree 5.
+/// The weights are samples of the Gaussian where the step resolves it (trapezoidal rule, exact to e^{−2π²} = 3e-9 for the
+/// sharpest function on the lattice). Otherwise, without offset, they are the five weights with the Gaussian's moments 1,
+/// σ² and 3σ⁴, exact for polynomials of degree 5.
 fn weights(ratio: f64, radius: usize, offset: f64) -> Vec<f64> {
     let distance = |n: usize| n as f64 - radius as f64 - offset;
     let q = ratio * ratio;
@@ -188,12 +190,12 @@ fn weights(ratio: f64, radius: usize, offset: f64) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// E[exp(a u + b v)] over independent Gaussians is exp((a²σu² + b²σv²)/2), whichever rule is used, at the
-    /// nodes and between them.
+    /// E[exp(a u + b v)] over independent Gaussians is exp((a²σu² + b²σv²)/2) with either rule, at the nodes and between
+    /// them.
     #[test]
     fn means_of_exponentials() {
         let (a, b) = (1.3f64, -0.7f64);
-        // Wide, narrow and no spread; the five weights are wrong by (15σ⁶ − 11 h⁶) a⁶/720, below 2e-9 here.
+        // Wide, narrow and no spread; the five weights err by (15σ⁶ − 11 h⁶) a⁶/720, below 2e-9 here.
         for (std, refinement) in [([0.1, 0.06], 3), ([0.02, 0.1], 1), ([0.0, 0.01], 1)] {
             let step = 0.03;
             let radius = std.map(|s| radius(s, step));
@@ -228,8 +230,8 @@ mod tests {
         }
     }
 
-    /// Six standard deviations on either side, and one step more for the points between nodes; even, and two at least of each
-    /// of two.
+    /// Six standard deviations on either side, plus one step for the points between nodes; even, and at least two at both
+    /// the step and twice the step.
     #[test]
     fn means_reach_six_standard_deviations() {
         for (std, step) in [(0.1, 0.03), (0.2, 0.02), (0.05, 0.05), (0.06, 0.017)] {

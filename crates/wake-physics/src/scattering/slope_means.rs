@@ -1,4 +1,4 @@
-//! Means of σ⁰ over slopes that pixels do not carry, on as many nodes as an error asks for.
+//! Means of σ⁰ over subpixel slopes, with as many nodes as the demanded error requires.
 
 use crate::numeric::gauss_hermite;
 use crate::scattering::slopes::SlopeCovariance;
@@ -6,15 +6,15 @@ use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_4, SQRT_2};
 use std::sync::LazyLock;
 
-/// Nodes of the rules, the last of which only tells the errors of the others.
+/// Node counts of the rules; the last rule serves only to estimate the errors of the others.
 const COUNTS: [usize; 10] = [1, 3, 5, 7, 9, 13, 19, 27, 39, 55];
-/// Number of rules that are taken.
+/// Number of rules in use.
 const USED: usize = COUNTS.len() - 1;
 
-/// Nodes of a smaller weight are left out: with them goes a ten-millionth of what σ⁰ is five deviations away.
+/// Smallest weight of a node that is kept; omitted nodes contribute a ten-millionth of σ⁰ five deviations away.
 const LEAST_WEIGHT: f64 = 1e-7;
 
-/// The rules: nodes, rising, and weights.
+/// The rules: nodes in ascending order, and weights.
 static RULES: LazyLock<Vec<Vec<[f64; 2]>>> = LazyLock::new(|| {
     let mut rules = gauss_hermite(&COUNTS);
     for rule in &mut rules {
@@ -23,35 +23,35 @@ static RULES: LazyLock<Vec<Vec<[f64; 2]>>> = LazyLock::new(|| {
     rules
 });
 
-/// Deviations at which the errors of the rules are looked at: each a factor of √2 below the one before.
+/// Number of deviations at which the errors of the rules are evaluated, each a factor of √2 below the previous one.
 const DEVIATIONS: usize = 14;
 
-/// Share of the variance along the second axis below which there is none: what rounding leaves of one wave alone.
+/// Share of the variance along the second axis below which it counts as zero: rounding error for a single wave.
 const ROUNDED: f64 = 1e-5;
 
-/// Places along each axis of the slopes at which the errors of the rules are looked at.
+/// Points along each axis of the slopes at which the errors of the rules are evaluated.
 const PLACES: usize = 5;
 
-/// Cells between them.
+/// Cells between these points.
 const CELLS: usize = PLACES - 1;
 
-/// Which rule a mean over slopes takes, by the slope it is around and the deviation of the others.
+/// Choice of the rule for a mean over slopes, by the central slope and the deviation of the others.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SlopeMeans {
-    /// Ranges of the slopes that means are around.
+    /// Ranges of the central slopes.
     facets: [[f64; 2]; 2],
-    /// Largest variance of each rule, by cell: `[CELLS, CELLS]`, the first axis running fastest.
+    /// Largest variance of each rule, by cell: `[CELLS, CELLS]`, with the first axis varying fastest.
     largest: Vec<[f64; USED]>,
     /// Error of the last rule at the largest deviation.
     error: f64,
 }
 
 impl SlopeMeans {
-    /// Number of rules that are taken.
+    /// Number of rules in use.
     #[cfg(test)]
     pub(crate) const RULES_TAKEN: usize = USED;
 
-    /// The farthest node from the middle, at most, for slopes of a variance in all.
+    /// Upper bound on the distance of the farthest node from the centre, for slopes of a given total variance.
     pub(crate) fn reach(variance: f64) -> f64 {
         if variance <= 0.0 {
             return 0.0;
@@ -60,7 +60,7 @@ impl SlopeMeans {
         farthest.map(|node| node[0]).fold(0.0, f64::max) * variance.sqrt()
     }
 
-    /// One rule for all means.
+    /// Uses one rule for all means.
     #[cfg(test)]
     pub(crate) fn fixed(rule: usize) -> Self {
         let mut largest = [0.0; USED];
@@ -72,9 +72,9 @@ impl SlopeMeans {
         }
     }
 
-    /// Rules for the means of a function to an absolute `error`, by what more nodes make of it along four directions.
+    /// Chooses rules for means of a function to an absolute `error`, from the effect of more nodes along four directions.
     ///
-    /// - `facets`: ranges of the slopes around which means are taken
+    /// - `facets`: ranges of the central slopes
     /// - `largest`: largest variance
     pub(crate) fn new(
         function: impl Fn([f64; 2]) -> f64 + Sync,
@@ -98,7 +98,7 @@ impl SlopeMeans {
             let [i, j] = [n % CELLS, n / CELLS];
             let corners = [[i, j], [i + 1, j], [i, j + 1], [i + 1, j + 1]];
             let of_corner = |rule: usize, [i, j]: [usize; 2]| {
-                // Two axes may err both.
+                // Both axes may contribute the error.
                 let keeps = |e: &&[f64; USED]| 2.0 * e[rule] <= error;
                 let at = errors[j * PLACES + i].iter().rev();
                 at.take_while(keeps).count()
@@ -135,7 +135,7 @@ impl SlopeMeans {
         &rules[fits.unwrap_or(USED - 1)]
     }
 
-    /// Largest variance of each rule where a mean is around a slope.
+    /// Largest variance of each rule for a mean around a slope.
     #[inline(always)]
     fn largest_at(&self, slope: [f64; 2]) -> &[f64; USED] {
         let cell = |axis: usize| {
@@ -146,7 +146,7 @@ impl SlopeMeans {
         &self.largest[cell(1) * CELLS + cell(0)]
     }
 
-    /// The mean of a function over slopes of a covariance around one.
+    /// Mean of a function over slopes of a given covariance around a central slope.
     #[inline(always)]
     pub(crate) fn around(
         &self,
@@ -177,12 +177,12 @@ impl SlopeMeans {
     }
 }
 
-/// Deviation number `n` of those at which errors are looked at.
+/// The `n`-th deviation at which errors are evaluated.
 fn deviation(largest: f64, n: usize) -> f64 {
     largest.sqrt() * SQRT_2.powi(-(n as i32))
 }
 
-/// Errors of the rules for means around a place along the worst of four directions.
+/// Errors of the rules for means around a point along the worst of four directions.
 fn errors_at(function: impl Fn([f64; 2]) -> f64, place: [f64; 2], deviation: f64) -> [f64; USED] {
     let mut worst = [0.0f64; USED];
     for turn in 0..4 {
@@ -202,7 +202,7 @@ fn errors_at(function: impl Fn([f64; 2]) -> f64, place: [f64; 2], deviation: f64
 mod tests {
     use super::*;
 
-    /// Moments of a unit Gaussian, 1, 1, 3, 15, …, (2n − 1)!!, but for the nodes left out.
+    /// Moments of a unit Gaussian, 1, 1, 3, 15, …, (2n − 1)!!, up to the omitted nodes.
     #[test]
     fn rules_are_exact_for_powers() {
         assert_eq!(RULES.len(), COUNTS.len());
@@ -214,7 +214,7 @@ mod tests {
                     assert!(moment.abs() < 1e-3, "{count} {power}");
                     continue;
                 }
-                // Nodes that are left out lie from five deviations on, each with a tenth of the weight of the one before.
+                // Omitted nodes begin at five deviations, each with a tenth of the previous weight.
                 let left_out = 4e-7 * 5.8f64.powi(power as i32);
                 assert!(
                     (moment / expected - 1.0).abs() < 1e-12 + left_out / expected,
@@ -225,7 +225,7 @@ mod tests {
         }
     }
 
-    /// E exp(cᵀs) = exp(½ cᵀCc), for which few nodes do where the slopes are small, and more where they are not.
+    /// E exp(cᵀs) = exp(½ cᵀCc), which needs few nodes for small slopes and more for large ones.
     #[test]
     fn means_are_as_exact_as_asked_for() {
         let function = |[x, y]: [f64; 2]| (9.0 * x - 4.0 * y).exp();
@@ -247,7 +247,7 @@ mod tests {
                         for &place in &places {
                             let expected = function(place) * (0.5 * square).exp();
                             let found = means.around(&covariance, place, function);
-                            // The error of each axis; other directions than the four may be worse by as much.
+                            // The error of each axis; directions other than the four may double it.
                             assert!(
                                 (found - expected).abs() < 4.0 * error,
                                 "{error} {variance} {degrees}: {found} {expected}"

@@ -1,4 +1,4 @@
-//! Gaussian slopes: their covariance, its axes and its density.
+//! Gaussian slopes: covariance, principal axes and density.
 
 use crate::numeric::vector::exp;
 use std::f64::consts::PI;
@@ -19,21 +19,21 @@ pub struct SlopeCovariance {
 pub(crate) struct PrincipalAxes {
     /// Unit vector of the first axis; the second is a quarter turn anticlockwise from it.
     pub axis: [f64; 2],
-    /// Variances along the first and the second axis, the first not smaller.
+    /// Variances along the first and the second axis; the first is not smaller.
     pub variance: [f64; 2],
 }
 
 impl SlopeCovariance {
-    /// No waves, no slopes.
+    /// Zero covariance: no waves.
     pub const NONE: Self = Self {
         xx: 0.0,
         xy: 0.0,
         yy: 0.0,
     };
 
-    /// Variances along and across the wind, turned into x and y.
+    /// Covariance from variances along and across the wind, rotated to x and y.
     ///
-    /// - `variance` along and across \[1\]; `wind` unit vector of where the wind blows to
+    /// - `variance` along and across \[1\]; `wind` unit vector of the wind direction (toward)
     #[must_use]
     pub fn along_wind(variance: [f64; 2], wind: [f64; 2]) -> Self {
         let [up, cross] = variance;
@@ -45,7 +45,7 @@ impl SlopeCovariance {
         }
     }
 
-    /// The same variance in every direction.
+    /// Covariance with the same variance in every direction.
     #[must_use]
     pub fn isotropic(variance: f64) -> Self {
         Self {
@@ -75,7 +75,7 @@ impl SlopeCovariance {
         }
     }
 
-    /// The same covariance in coordinates along some axes.
+    /// This covariance in coordinates along given axes.
     #[inline(always)]
     pub(crate) fn turned(&self, axes: &PrincipalAxes) -> Self {
         let [a, b] = axes.axis;
@@ -110,7 +110,7 @@ impl SlopeCovariance {
         let mean = 0.5 * (self.xx + self.yy);
         let half = 0.5 * (self.xx - self.yy);
         let radius = (half * half + self.xy * self.xy).sqrt();
-        // Half the angle whose cosine is half/radius and whose sine xy/radius; the larger of both from a root.
+        // Half the angle with cosine half/radius and sine xy/radius; the larger of the two is computed as a root.
         let larger = (0.5 + 0.5 * half.abs() / radius).sqrt();
         let smaller = 0.5 * self.xy / (radius * larger);
         let [cos, sin] = if radius <= 0.0 {
@@ -134,23 +134,23 @@ impl SlopeCovariance {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SlopeDensity {
-    /// Density of no slope \[1\].
+    /// Density at zero slope \[1\].
     pub(crate) peak: f64,
     /// Coefficients of x², xy and y² in the exponent.
     form: [f64; 3],
 }
 
-/// Exponent beyond which a density is 0: 2e-35 of the peak, and without the cost of an exponential.
+/// Exponent beyond which a density is 0: 2e-35 of the peak, which saves the exponential.
 const FARTHEST: f64 = 80.0;
 
 impl SlopeDensity {
-    /// No slope at all: 0 everywhere.
+    /// Zero density everywhere.
     pub(crate) const NONE: Self = Self {
         peak: 0.0,
         form: [0.0; 3],
     };
 
-    /// The density of a slope \[1\].
+    /// Density at a slope \[1\].
     #[inline(always)]
     pub(crate) fn at(&self, [x, y]: [f64; 2]) -> f64 {
         let exponent = self.form[0] * x * x + self.form[1] * x * y + self.form[2] * y * y;
@@ -180,8 +180,8 @@ impl PrincipalAxes {
 /// E[f] ≈ Σ wₙ f(uₙ),   uₙ = n h,   h at most `step` and std/2
 /// ```
 ///
-/// The trapezoid rule is exact to e^{−2π²w²/h²} for functions no sharper than a Gaussian of width w; the tails
-/// beyond 6 standard deviations (2e-9 of the mass) are left out. One node where there is no spread.
+/// The trapezoidal rule is exact to e^{−2π²w²/h²} for functions no sharper than a Gaussian of width w. The tails beyond 6
+/// standard deviations (2e-9 of the mass) are omitted. Without spread there is a single node.
 pub(crate) fn gaussian_nodes(std: f64, step: f64) -> Vec<[f64; 2]> {
     if std <= 0.0 {
         return vec![[0.0, 1.0]];
@@ -238,7 +238,7 @@ mod tests {
             xy: -0.006,
             yy: 0.01,
         };
-        // Trapezoid rule to 8 standard deviations at an eighth of one: exact to rounding.
+        // Trapezoidal rule out to 8 standard deviations in steps of an eighth: exact up to rounding.
         let step = 0.0125;
         let density = c.density();
         let mut sum = [0.0; 4];
@@ -260,7 +260,7 @@ mod tests {
         assert_eq!(SlopeCovariance::NONE.density().at([0.0, 0.0]), 0.0);
     }
 
-    /// Moments 0, 2 and 4 of a Gaussian: 1, σ², 3σ⁴, up to the tails left out.
+    /// Moments 0, 2 and 4 of a Gaussian: 1, σ², 3σ⁴, up to the omitted tails.
     #[test]
     fn gaussian_nodes_have_gaussian_moments() {
         for (std, step) in [(0.1, 0.02), (0.1, 1.0), (0.001, 0.02), (0.0, 0.1)] {

@@ -1,4 +1,4 @@
-//! Quasi-specular return: facets that happen to be mirrors to the radar.
+//! Quasi-specular return of facets that reflect the radar beam back like mirrors.
 
 use crate::scattering::slopes::{SlopeCovariance, SlopeDensity};
 use num_complex::Complex64;
@@ -10,14 +10,14 @@ use std::f64::consts::{FRAC_PI_2, PI};
 /// σ(s) = π |R(0)|² sec⁴θ p(tan θ − s_x, −s_y),   R(0) = (√ε − 1)/(√ε + 1)
 /// ```
 ///
-/// p is the density of the unresolved slopes: a mirror to the radar is a facet of total slope (tan θ, 0), which
-/// rises away from the radar at the incidence angle. With no resolved slope and one variance mss/2 in every
-/// direction this is |R|² sec⁴θ exp(−tan²θ/mss)/mss.
+/// p is the density of the unresolved slopes: a facet of total slope (tan θ, 0), which rises away from the radar at the
+/// incidence angle, is a mirror to the radar. With no resolved slope and an isotropic variance mss/2 this is
+/// |R|² sec⁴θ exp(−tan²θ/mss)/mss.
 ///
 /// # Without unresolved slopes
 ///
-/// p would be a delta function. But a plane mirror of pixel size L reflects into a lobe, and the lobe acts like
-/// slopes of variance (π/2)/(`k_e` L)²: with it a flat pixel at its specular slope has the cross-section
+/// p would be a delta function. But a plane mirror of pixel size L reflects into a lobe, which acts like slopes of variance
+/// (π/2)/(`k_e` L)². With it, a flat pixel at its specular slope has the cross-section
 /// |R|² 4π L²/λ² of a mirror, and every σ is finite. See [`mirror_lobe`](Self::mirror_lobe).
 ///
 /// # References
@@ -42,8 +42,8 @@ impl Specular {
         density: SlopeDensity::NONE,
     };
 
-    /// The return of water of a permittivity, seen at an incidence θ \[rad\], with unresolved slopes and the
-    /// slope variance [`mirror_lobe`](Self::mirror_lobe) of the pixel's own lobe.
+    /// The return of water with a permittivity at an incidence θ \[rad\], given the unresolved slopes and the slope
+    /// variance [`mirror_lobe`](Self::mirror_lobe) of the pixel's lobe.
     #[must_use]
     pub fn new(
         permittivity: Complex64,
@@ -62,10 +62,10 @@ impl Specular {
         }
     }
 
-    /// Slope variance that stands for the lobe of a square mirror, (π/2)/(`k_e` L)² \[1\].
+    /// Slope variance that represents the lobe of a square mirror, (π/2)/(`k_e` L)² \[1\].
     ///
-    /// The lobe sinc²(`k_e` L s) has the peak 1 and the area π/(`k_e` L); the Gaussian of the same peak and area has
-    /// this variance.
+    /// The lobe sinc²(`k_e` L s) has the peak 1 and the area π/(`k_e` L); the Gaussian with the same peak and area has this
+    /// variance.
     ///
     /// - `radar_wavenumber` `k_e` [rad/m], `size` L \[m\]
     #[must_use]
@@ -80,7 +80,7 @@ impl Specular {
         self.strength * self.density.at(self.missing(slope))
     }
 
-    /// The mean return where there are `more` unresolved slopes.
+    /// Mean return with `more` unresolved slopes.
     #[must_use]
     pub(crate) fn over(&self, more: &SlopeCovariance) -> Self {
         let covariance = self.covariance.plus(more);
@@ -91,7 +91,7 @@ impl Specular {
         }
     }
 
-    /// Mean over resolved slopes: the two bands of slopes add up.
+    /// Mean over resolved slopes: the covariances of the two bands add up.
     #[must_use]
     pub fn mean_over(&self, resolved: &SlopeCovariance) -> f64 {
         self.over(resolved).sigma0([0.0; 2])
@@ -109,7 +109,7 @@ impl Specular {
         self.strength * square.sqrt()
     }
 
-    /// The slope that turns a facet of resolved slope s into a mirror.
+    /// Slope still needed to turn a facet of resolved slope s into a mirror.
     #[inline(always)]
     fn missing(&self, [sx, sy]: [f64; 2]) -> [f64; 2] {
         [self.tan_incidence - sx, -sy]
@@ -137,7 +137,7 @@ mod tests {
         assert!((specular.sigma0([0.0; 2]) / expected - 1.0).abs() < 1e-13);
     }
 
-    /// A facet that leans toward the radar by the incidence angle is the brightest.
+    /// A facet inclined toward the radar by the incidence angle is the brightest.
     #[test]
     fn brightest_slope_faces_the_radar() {
         let specular = Specular::new(WATER, 0.35, &SlopeCovariance::isotropic(0.01), 0.0);
@@ -147,7 +147,7 @@ mod tests {
         assert!(best > specular.sigma0([0.35f64.tan(), 0.05]));
     }
 
-    /// A flat pixel seen from above is a mirror: |R|² 4π L²/λ².
+    /// A flat pixel viewed from above is a mirror: |R|² 4π L²/λ².
     #[test]
     fn flat_pixel_is_a_mirror() {
         let (k, size) = (201.2, 2.5);
@@ -159,7 +159,7 @@ mod tests {
         assert!((specular.sigma0([0.0; 2]) / mirror - 1.0).abs() < 1e-12);
     }
 
-    /// Means over resolved slopes, closed form against quadrature.
+    /// Means over resolved slopes: closed form against quadrature.
     #[test]
     fn moments_over_resolved_slopes() {
         let resolved = SlopeCovariance::along_wind([0.006, 0.003], [0.6, 0.8]);
@@ -175,12 +175,12 @@ mod tests {
                 square += wu * wv * s * s;
             }
         }
-        // The quadrature leaves out tails of 2e-9, here worth up to a hundred times as much.
+        // The quadrature omits tails of 2e-9, which count up to a hundred times as much here.
         assert!((specular.mean_over(&resolved) / mean - 1.0).abs() < 2e-7);
         assert!((specular.rms_over(&resolved) / square.sqrt() - 1.0).abs() < 2e-7);
     }
 
-    /// No slopes, no lobe, extreme angles: finite.
+    /// Values are finite without slopes, without a lobe and at extreme angles.
     #[test]
     fn limits_are_finite() {
         for degrees in [5.0f64, 75.0] {

@@ -1,4 +1,4 @@
-//! σ⁰ as a table over two slopes: the fast way.
+//! σ⁰ by interpolation in a table over two slopes: the fast method.
 
 use crate::numeric::vectorized;
 use crate::raster::Field;
@@ -10,44 +10,44 @@ use crate::scattering::table_error::{OF_MEANS, Weights, error_between_nodes};
 use crate::scattering::{Backscatter, FacetFields, SlopeCovariance};
 use rayon::prelude::*;
 
-/// First spacing of facets tried \[1\]: a quarter of the width of the roll-off near nadir.
+/// First facet spacing tried \[1\]: a quarter of the width of the roll-off near nadir.
 const FIRST_SPACING: f64 = 0.02;
 
 /// Steepest slope along an axis that the table covers \[1\]; steeper facets are rare and evaluated exactly.
 const STEEPEST: f64 = 1.5;
 
-/// Most nodes of a table, and for each pixel that it is made for if that is more: chosen; 32 MiB.
+/// Largest number of nodes of a table, and per pixel if that is more: chosen; 32 MiB.
 const MOST_NODES: usize = 1 << 22;
 const NODES_FOR_EACH: usize = 4;
 
-/// Standard deviations of the slopes that a table covers, foreseen.
+/// Standard deviations of the slopes that a table is expected to cover.
 const COVERED: f64 = 5.0;
 
-/// Most facets evaluated for one table.
+/// Largest number of facets evaluated for a table.
 const MOST_FACETS: usize = 1 << 19;
 
 /// Backscatter of facets by interpolation.
 ///
-/// The Bragg return of plane facets is sampled on a lattice of slopes along the principal axes of the unresolved
-/// ones. There the average over tilt is two one-dimensional sums, taken at the nodes of a finer lattice. The
-/// averaged values are interpolated bicubically; the specular return is a single Gaussian and needs no table.
+/// The Bragg return of plane facets is sampled on a lattice of slopes along the principal axes of the unresolved slopes.
+/// There, the average over tilt is two one-dimensional sums, evaluated at the nodes of a finer lattice. The averaged values
+/// are interpolated bicubically; the specular return is a single Gaussian and needs no table.
 ///
 /// # Error
 ///
-/// Two errors are measured while the table is made, which is refined until their sum is small enough.
+/// Two errors are measured while the table is built; it is refined until their sum is small enough.
 ///
-/// Averages: they are compared with those from every other facet. The trapezoid rule converges so fast that
-/// halving the spacing takes a relative error e to about e^1.8 (the roll-off near nadir is the sharpest feature);
-/// stated is e^(4/3), relative to the largest average.
+/// Averages: they are compared with averages over every other facet. The trapezoidal rule converges so fast that halving
+/// the spacing reduces a relative error e to about e^1.8 (the roll-off near nadir is the sharpest feature); the stated
+/// error is e^(4/3), relative to the largest average.
 ///
-/// Interpolation: it is repeated with every other node and compared at the nodes left out. It is of fourth
-/// order, so its error is a sixteenth of the difference; stated is an eighth.
+/// Interpolation: it is repeated from every other node and compared at the omitted nodes. It is of fourth order, so its
+/// error is a sixteenth of the difference; the stated error is an eighth.
 ///
-/// Plane facets, which no average over tilt makes smooth, have corners near nadir, where no order of convergence can be
-/// trusted: there the table is compared with the facets themselves, between the nodes of the cells where it is least
-/// smooth. A table that does not reach the error asked for is not used for them: each pixel is then evaluated exactly.
+/// Plane facets, which no tilt average smooths, have corners near nadir, where the order of convergence is unreliable.
+/// There the table is compared with the facets themselves, between the nodes of the least smooth cells. A table of plane
+/// facets that misses the demanded error is not used: each pixel is then evaluated exactly.
 ///
-/// σ⁰ is at least 0; where an interpolation overshoots below, 0 is nearer.
+/// σ⁰ is at least 0; interpolated values below 0 are set to 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BackscatterTable {
     backscatter: Backscatter,
@@ -55,34 +55,34 @@ pub struct BackscatterTable {
     /// `None`: every facet is evaluated exactly.
     interpolation: Option<Bicubic>,
     error: f64,
-    /// What it was made for.
+    /// Inputs for which the table was built.
     made_for: MadeFor,
-    /// Ranges of slope that it covers along the axes.
+    /// Ranges of slope covered along the axes.
     range: [[f64; 2]; 2],
-    /// How means over unresolved slopes are taken, where there are any.
+    /// Rules for means over additional subpixel slopes, if there are any.
     means: Option<SlopeMeans>,
 }
 
-/// What a table is made for.
+/// Inputs for which a table is built.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct MadeFor {
     /// Ranges of the facets' slopes along the axes.
     facets: [[f64; 2]; 2],
-    /// Largest variance of unresolved slopes.
+    /// Largest variance of additional subpixel slopes.
     variance: f64,
-    /// The error asked for.
+    /// The demanded error.
     error: f64,
-    /// Nodes at most.
+    /// Largest number of nodes.
     most_nodes: usize,
 }
 
-/// Nodes of a table for some pixels, at most.
+/// Largest number of nodes of a table for a number of pixels.
 fn most_nodes(pixels: usize) -> usize {
     MOST_NODES.max(NODES_FOR_EACH * pixels)
 }
 
 impl MadeFor {
-    /// Ranges of the slopes that facets and means over unresolved ones look at.
+    /// Ranges of slopes needed by facets and by means over additional subpixel slopes.
     fn range(&self) -> [[f64; 2]; 2] {
         let reach = SlopeMeans::reach(self.variance);
         let widened = |[first, last]: [f64; 2]| [first - reach, last + reach];
@@ -99,7 +99,7 @@ impl MadeFor {
 }
 
 impl BackscatterTable {
-    /// A table for the slopes that occur in some facets, and as far beyond as means over their unresolved ones look.
+    /// A table covering the slopes of the given facets, extended by the reach of means over their subpixel slopes.
     ///
     /// - `error` largest absolute error of σ⁰ \[1\]: a tolerance times the mean σ⁰
     #[must_use]
@@ -107,7 +107,7 @@ impl BackscatterTable {
         Self::covering_or(None, backscatter, facets, error)
     }
 
-    /// [`Self::covering`], which is `last` if that was made for the same.
+    /// [`Self::covering`], but returns `last` if it was built for the same inputs.
     pub(crate) fn covering_or(
         last: Option<Self>,
         backscatter: Backscatter,
@@ -126,7 +126,7 @@ impl BackscatterTable {
             .unwrap_or_else(|| Self::over(backscatter, made_for))
     }
 
-    /// A table, and the rules of the means over it.
+    /// Builds a table and the rules of the means over it.
     fn over(backscatter: Backscatter, made_for: MadeFor) -> Self {
         if made_for.variance <= 0.0 {
             return Self::interpolating(backscatter, made_for, made_for.error);
@@ -146,7 +146,7 @@ impl BackscatterTable {
         table
     }
 
-    /// A table without means.
+    /// Builds a table without means.
     fn interpolating(backscatter: Backscatter, made_for: MadeFor, error: f64) -> Self {
         let axes = backscatter.tilt.principal_axes();
         let weights = made_for.weights();
@@ -178,10 +178,10 @@ impl BackscatterTable {
         }
     }
 
-    /// Nodes of a table, about, by the smoothness of the coarsest.
+    /// Estimated number of nodes of a table, from the smoothness of the coarsest one.
     ///
-    /// - `slopes` of the facets; largest `variance` of unresolved ones
-    /// - `error` as in [`Self::covering`]; `pixels`: how many there are
+    /// - `slopes` of the facets; largest `variance` of additional subpixel slopes
+    /// - `error` as in [`Self::covering`]; `pixels`: their number
     pub(crate) fn foreseen(
         backscatter: &Backscatter,
         slopes: &SlopeCovariance,
@@ -189,7 +189,7 @@ impl BackscatterTable {
         error: f64,
         pixels: usize,
     ) -> f64 {
-        // What fields of `f32` do not hold has no table.
+        // Errors too small for `f32` fields get no table.
         if error < f64::from(f32::MIN_POSITIVE) {
             return 0.0;
         }
@@ -220,7 +220,7 @@ impl BackscatterTable {
         self.interpolation.as_ref().map_or([0; 2], Bicubic::nodes)
     }
 
-    /// Stated absolute error of the interpolated σ⁰ \[1\]; above the one asked for where that took too many facets.
+    /// Stated absolute error of the interpolated σ⁰ \[1\]; above the demanded one if that needed too many facets.
     #[must_use]
     pub fn error(&self) -> f64 {
         self.error
@@ -242,7 +242,7 @@ impl BackscatterTable {
         }
     }
 
-    /// The same at a node of a mean, in coordinates along the axes: where waves are steeper than any the table covers, that of its edge.
+    /// Bragg return at a node of a mean, in coordinates along the axes; slopes beyond the table get the value at its edge.
     #[inline(always)]
     fn bragg_around(&self, point: [f64; 2]) -> f64 {
         let Some(table) = &self.interpolation else {
@@ -267,7 +267,7 @@ impl BackscatterTable {
         field
     }
 
-    /// [`Self::sigma0_field`] over a field of the same size.
+    /// [`Self::sigma0_field`] written into a field of the same size.
     pub(crate) fn fill_sigma0(&self, field: &mut Field, fields: &FacetFields<'_>) {
         let columns = field.columns;
         field
@@ -280,7 +280,7 @@ impl BackscatterTable {
             );
     }
 
-    /// σ⁰ of the pixels from `first` on: a loop that looks up, then one that the compiler can vectorise.
+    /// σ⁰ of the pixels from `first`: a lookup loop, followed by a loop that the compiler can vectorise.
     fn sigma0_row(
         &self,
         fields: &FacetFields<'_>,
@@ -307,7 +307,7 @@ impl BackscatterTable {
 }
 
 impl Backscatter {
-    /// Share of Gaussian slopes along the axes of the unresolved ones that are steeper than a table covers, at most 1.
+    /// Share of Gaussian slopes, along the axes of the unresolved slopes, steeper than a table covers; at most 1.
     pub(crate) fn steep_share(&self, slopes: &SlopeCovariance) -> f64 {
         let axes = self.tilt.principal_axes();
         let share =
@@ -316,7 +316,7 @@ impl Backscatter {
     }
 }
 
-/// Variance of slopes along one of the axes of others.
+/// Variance of slopes along one of the given axes.
 fn variance_along(axes: &PrincipalAxes, slopes: &SlopeCovariance, axis: usize) -> f64 {
     let mut unit = [0.0; 2];
     unit[axis] = 1.0;
@@ -325,7 +325,7 @@ fn variance_along(axes: &PrincipalAxes, slopes: &SlopeCovariance, axis: usize) -
 }
 
 impl BackscatterTable {
-    /// σ⁰ of the pixels from `first` on, where some have slopes that their neighbours do not have; `bragg` is without.
+    /// σ⁰ of the pixels from `first` where some have additional subpixel slopes; `bragg` is the return without these.
     fn roughened_row(
         &self,
         fields: &FacetFields<'_>,
@@ -352,10 +352,10 @@ impl BackscatterTable {
     }
 }
 
-/// The range of a table ends on multiples of this slope \[1\]: fields that hardly differ get the same table.
+/// The range of a table ends on multiples of this slope \[1\], so that almost equal fields get the same table.
 const RANGE_STEP: f64 = 1.0 / 16.0;
 
-/// Range of the slopes along two axes, rounded outward, at least 0 to 0 and at most [`STEEPEST`] either way.
+/// Range of the slopes along two axes, rounded outward, including 0 and limited to [`STEEPEST`] either way.
 fn extent(axes: &PrincipalAxes, [slope_x, slope_y]: [&[f32]; 2]) -> [[f64; 2]; 2] {
     let widen = |a: [[f64; 2]; 2], b: [[f64; 2]; 2]| {
         [0, 1].map(|n| [a[n][0].min(b[n][0]), a[n][1].max(b[n][1])])
@@ -439,7 +439,7 @@ mod tests {
         }
     }
 
-    /// Slopes out to 0.3 and 0.24, a regular pattern of irrational frequencies.
+    /// Slopes up to 0.3 and 0.24, in a regular pattern of irrational frequencies.
     fn slopes(size: usize) -> [Field; 2] {
         let raster = Raster::image(size, size, 1.0);
         let field = |scale: f64, a: f64, b: f64| {
@@ -455,7 +455,7 @@ mod tests {
         backscatter.mean_over(&resolved).iter().sum()
     }
 
-    /// The caller's tolerance is met at every level, and the stated error bounds the true one.
+    /// The requested tolerance holds at all levels, and the stated error bounds the true one.
     #[test]
     fn tolerance_is_met_at_every_level() {
         let [x, y] = slopes(8);
@@ -507,7 +507,7 @@ mod tests {
                 assert!(table.error() <= allowed, "{} {tolerance}", case.degrees);
                 for (&slope, &exact) in slopes.iter().zip(&exact) {
                     let error = (table.lookup(slope)[0] - exact).abs();
-                    // The oracle's own error comes on top.
+                    // Plus the reference's own error.
                     let bound = table.error() + 2e-7 * exact;
                     assert!(
                         error <= bound,
@@ -519,7 +519,7 @@ mod tests {
         }
     }
 
-    /// Whole fields, table against oracle, up to the rounding of single precision.
+    /// Whole fields, table against reference, up to rounding to single precision.
     #[test]
     fn fields_agree_with_the_oracle() {
         let [x, y] = slopes(8);
@@ -546,7 +546,7 @@ mod tests {
         );
     }
 
-    /// Pixels so fine that no slope is unresolved: the table interpolates plane facets.
+    /// Pixels so fine that all slopes are resolved: the table interpolates plane facets.
     #[test]
     fn works_without_unresolved_slopes() {
         let case = Case {
@@ -565,8 +565,8 @@ mod tests {
         assert!(error <= 1e-3 * exact.rms(), "{error}");
     }
 
-    /// Near nadir plane facets have a corner that no order of convergence knows: σ⁰ is never negative, and as near the
-    /// facets' own as was asked for.
+    /// Near nadir plane facets have a corner that breaks the order of convergence: σ⁰ is never negative, and matches the
+    /// facets' own within the demanded error.
     #[test]
     fn plane_facets_near_nadir_are_not_negative_and_within_the_error() {
         let [x, y] = slopes(48);
@@ -594,7 +594,7 @@ mod tests {
             let table = BackscatterTable::covering(backscatter, &facets, allowed);
             assert!(table.error() <= allowed, "{degrees}");
             let (error, _) = table.sigma0_field(&facets).difference(&exact);
-            // The rounding of f32 comes on top.
+            // Plus rounding to f32.
             assert!(
                 error <= allowed + 1e-6 * exact.rms(),
                 "{degrees} {frequency}: {error} {allowed}"
@@ -608,8 +608,8 @@ mod tests {
         }
     }
 
-    /// Slopes that pixels do not carry, of waves of one direction and of two, up to those that break: within the error asked
-    /// for of the quadrature over the sum of both covariances.
+    /// Subpixel slopes of waves of one direction and of two, up to breaking: within the demanded error of quadrature over
+    /// the sum of both covariances.
     #[test]
     fn unresolved_slopes_are_averaged_over_within_the_error() {
         let l_band = Case {
@@ -651,7 +651,7 @@ mod tests {
             for tolerance in [1e-1, 1e-2, 1e-3, 1e-4, 1e-5] {
                 let allowed = tolerance * mean(&backscatter);
                 let table = BackscatterTable::covering(backscatter.clone(), &facets, allowed);
-                // Corners near nadir keep low levels from being reached where slopes are as large as these: it is stated.
+                // With such large slopes, corners near nadir prevent low error levels, which the table states.
                 let stated = table.error() / allowed;
                 assert!(
                     stated <= 1.0 || tolerance < 0.1,
@@ -659,7 +659,7 @@ mod tests {
                     case.degrees
                 );
                 let (error, _) = table.sigma0_field(&facets).difference(&exact);
-                // The rounding of f32, and the oracle's own error.
+                // Rounding to f32, and the reference's own error.
                 assert!(
                     error <= table.error() + 1e-6 * exact.rms(),
                     "{} {tolerance}: {error} {allowed}",
@@ -669,7 +669,7 @@ mod tests {
         }
     }
 
-    /// Time and error of one fixed rule for all means over slopes, and the spacings of tables: figures of decision 32.
+    /// Time and error of a single fixed rule for all means over slopes, and the spacings of tables: figures of decision 32.
     #[test]
     #[ignore = "a report of times and errors: --ignored --nocapture"]
     #[allow(clippy::print_stdout, reason = "figures are what it is for")]
@@ -679,7 +679,7 @@ mod tests {
         for slope in x.values.iter_mut().chain(&mut y.values) {
             *slope *= 0.5;
         }
-        // A wake's waves, from far away to those that break.
+        // The waves of a wake, from far away to breaking.
         let variance = |n: usize| 0.02 * (1.0 - n as f32 / x.values.len() as f32).powi(8);
         let of = |share: f32| Field {
             values: (0..x.values.len()).map(|n| share * variance(n)).collect(),
@@ -749,7 +749,7 @@ mod tests {
         }
     }
 
-    /// Only the Bragg part is modulated and damped, and never below nothing.
+    /// Only the Bragg part is modulated and damped, and it never becomes negative.
     #[test]
     fn modulation_and_damping_act_on_bragg_alone() {
         let backscatter = Case {
@@ -782,7 +782,7 @@ mod tests {
         }
     }
 
-    /// A sea without wind: no Bragg return, a glint where the facet is a mirror, nothing else.
+    /// A sea without wind has no Bragg return, only a glint where the facet is a mirror.
     #[test]
     fn calm_sea_returns_glints_only() {
         let backscatter = Case {
@@ -806,7 +806,7 @@ mod tests {
         assert_eq!(table.error(), 0.0);
     }
 
-    /// Every angle, wind and band of a scene: finite and not negative.
+    /// σ⁰ is finite and not negative for every angle, wind and band of a scene.
     #[test]
     fn hard_cases_are_finite() {
         let [x, y] = slopes(5);
@@ -857,7 +857,7 @@ mod tests {
                 let lattice = &facets.lattice;
                 assert!((lattice.start[axis] - (first - beyond)).abs() < 1e-12);
                 let end = lattice.start[axis] + spacing * (lattice.nodes[axis] - 1) as f64;
-                // Up to two nodes more make their number odd.
+                // Up to two extra nodes make the number odd.
                 let more = end - (last + beyond);
                 assert!((-1e-12..2.0 * spacing).contains(&more), "{spacing}: {more}");
                 assert!(!lattice.nodes[axis].is_multiple_of(2));
@@ -865,7 +865,7 @@ mod tests {
         }
     }
 
-    /// An error e^{−a/h}: from 10⁻³ to 10⁻⁴ the spacing falls to three quarters; never below half, nor by less than 0.85.
+    /// For an error e^{−a/h}, from 10⁻³ to 10⁻⁴ the spacing falls to three quarters; the factor stays within 0.5 to 0.85.
     #[test]
     fn the_next_spacing_follows_the_exponent() {
         let average = |error: f64| Average {
@@ -880,7 +880,7 @@ mod tests {
         assert!((next(2.0, 1e-4) - 0.5).abs() < 1e-12);
     }
 
-    /// An error that no number of facets reaches: the search ends, and says what it has. Plane facets need no table.
+    /// For an unreachable error the search ends and states the error reached. Plane facets need no table.
     #[test]
     fn what_cannot_be_reached_is_stated() {
         let backscatter = DEFAULT.backscatter();

@@ -1,32 +1,32 @@
-//! Errors of an interpolation on a lattice of slopes, and how much they count by place.
+//! Errors of an interpolation on a lattice of slopes, and their weights by position.
 
 use crate::scattering::bicubic::Bicubic;
 use crate::scattering::slope_lattice::SlopeLattice;
 use rayon::prelude::*;
 
-/// Cells of a table of plane facets in which it is compared with the facets themselves.
+/// Cells in which a table of plane facets is compared with the facets themselves.
 const CHECKED: usize = 64;
 
-/// Largest error of a mean over that of a table by its [`Weights`]: ∫ x e^{−x²/2}/w dx = ¾ + ½, with w = 1 up to x² = 4 ln 2.
+/// Largest error of a mean over that of a table with [`Weights`]: ∫ x e^{−x²/2}/w dx = ¾ + ½, with w = 1 up to x² = 4 ln 2.
 pub(crate) const OF_MEANS: f64 = 1.25;
 
-/// How much the error of a table counts, by place.
+/// Weight of the error of a table, by position.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Weights {
     /// Ranges of the facets' own slopes along the axes.
     pub(crate) facets: [[f64; 2]; 2],
-    /// Largest variance of unresolved slopes.
+    /// Largest variance of additional subpixel slopes.
     pub(crate) variance: f64,
 }
 
 impl Weights {
-    /// 1 among the facets; beyond them at most
+    /// Weight 1 within the range of facets; beyond it at most
     ///
     /// ```text
     /// 2 exp(−d²/4σ²)
     /// ```
     ///
-    /// at the distance d, for only means look there, whose density falls as exp(−d²/2σ²): see [`OF_MEANS`].
+    /// at the distance d, because only means reach there, with a density that falls as exp(−d²/2σ²): see [`OF_MEANS`].
     pub(crate) fn at(&self, point: [f64; 2]) -> f64 {
         if self.variance <= 0.0 {
             return 1.0;
@@ -40,8 +40,8 @@ impl Weights {
     }
 }
 
-/// An eighth of the largest difference between a lattice and the interpolation of every other node of it, at
-/// the middles of its cells.
+/// An eighth of the largest difference between a lattice and the interpolation of its every other node, at the centres of
+/// the coarse cells.
 pub(crate) fn interpolation_error(lattice: &SlopeLattice, weights: &Weights) -> f64 {
     let coarse = Bicubic::through(lattice.every_other());
     let mut difference = 0.0f64;
@@ -58,8 +58,8 @@ pub(crate) fn interpolation_error(lattice: &SlopeLattice, weights: &Weights) -> 
     difference / 8.0
 }
 
-/// The largest difference between a function and the interpolation of its values, at points between the nodes of the
-/// cells whose corners differ most from what their neighbours on both sides say.
+/// Largest difference between a function and the interpolation of its values, at points between the nodes of the cells
+/// where the second differences are largest.
 pub(crate) fn error_between_nodes(
     lattice: &SlopeLattice,
     function: impl Fn([f64; 2]) -> f64 + Sync,
@@ -81,7 +81,7 @@ pub(crate) fn error_between_nodes(
     worst.select_nth_unstable_by(kept - 1, |a, b| b.0.total_cmp(&a.0));
     let table = Bicubic::through(lattice.clone());
     let points = worst[..kept].iter().flat_map(|&(_, (i, j))| {
-        // On the four sides of the node, and between them.
+        // On the four sides of the node, and between these.
         [
             (-0.5, 0.0),
             (0.5, 0.0),
@@ -115,7 +115,8 @@ pub(crate) fn error_between_nodes(
 mod tests {
     use super::*;
 
-    /// ∫ x e^{−x²/2}/w dx, w the weight x deviations away: errors as large as allowed everywhere make the error allowed.
+    /// ∫ x e^{−x²/2}/w dx with w the weight x deviations away: the largest allowed errors everywhere add up to the allowed
+    /// error.
     #[test]
     fn errors_beyond_the_facets_count_as_means_look_there() {
         let weights = Weights {

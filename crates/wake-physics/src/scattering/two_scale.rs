@@ -1,4 +1,4 @@
-//! The two-scale model: short waves that scatter, carried on facets that tilt.
+//! Two-scale model: short waves scatter on facets tilted by longer waves.
 
 use crate::numeric::vector::{exp, vectorized};
 use crate::scattering::Polarization;
@@ -8,15 +8,15 @@ use crate::spectrum::Elfouhaily;
 use num_complex::Complex64;
 
 /// Split wavenumber over radar wavenumber, `k_d`/`k_e` \[1\]. Longer waves tilt facets, shorter ones scatter.
-/// Between the 3 and the 5 radar wavelengths in use (`k_e`/3 to `k_e`/5).
+/// The ratio lies between the usual 3 and 5 radar wavelengths (`k_e`/3 to `k_e`/5).
 const SPLIT: f64 = 0.25;
 
-/// Where the Bragg return rolls off, over `k_d` \[1\]: chosen, so that the mean σ⁰ at 24° is within 0.1 dB of that
-/// with a sharp limit at `k_d`.
+/// Wavenumber of the roll-off of the Bragg return, over `k_d` \[1\]: chosen, so that the mean σ⁰ at 24° is within 0.1 dB of
+/// that with a sharp limit at `k_d`.
 const ROLL_OFF: f64 = 0.86;
 
-/// Spacing of slopes of the exact average \[1\]: a tenth of the width of the roll-off near nadir, the sharpest
-/// feature of the Bragg return. Half of it changes the average by less than 2e-7.
+/// Spacing of slopes of the exact average \[1\]: a tenth of the width of the roll-off near nadir, the sharpest feature of
+/// the Bragg return. Half the spacing changes the average by less than 2e-7.
 const FINE_SLOPES: f64 = 0.008;
 
 /// Bragg scattering by tilted facets, for one radar, one sea and one wind.
@@ -43,7 +43,7 @@ impl TwoScale {
     ///
     /// - `incidence` θ \[rad\], 0 to π/2; `radar_wavenumber` `k_e` = 2π/λ [rad/m]
     /// - `permittivity` ε of the water; `spectrum` of the short waves
-    /// - `wind` unit vector (x, y) of where the wind blows to
+    /// - `wind` unit vector (x, y) of the wind direction (toward)
     #[must_use]
     pub fn new(
         incidence: f64,
@@ -70,9 +70,9 @@ impl TwoScale {
         SPLIT * self.radar_wavenumber
     }
 
-    /// Slopes of the waves from `wavenumber` [rad/m] to `k_d`; none if there is no wave between them.
+    /// Slopes of the waves from `wavenumber` [rad/m] to `k_d`; zero if there are no waves between them.
     ///
-    /// From the Nyquist wavenumber of a pixel these are the slopes it does not resolve, from 0 all slopes.
+    /// From a pixel's Nyquist wavenumber these are the slopes that it does not resolve, from 0 all slopes.
     #[must_use]
     pub fn slopes_from(&self, wavenumber: f64) -> SlopeCovariance {
         let variance = self
@@ -81,7 +81,7 @@ impl TwoScale {
         SlopeCovariance::along_wind(variance, self.wind)
     }
 
-    /// Bragg cross-section of a plane facet, per unit area of the horizontal plane.
+    /// Bragg σ⁰ of a plane facet, per unit area of the horizontal plane.
     ///
     /// ```text
     /// s_p = atan(s_x)   s_n = atan(s_y cos s_p)   θ' = θ − s_p   cos θ_i = cos θ' cos s_n
@@ -90,27 +90,27 @@ impl TwoScale {
     /// σ = 16π k_e⁴ cos⁴θ_i |g|² Ψ(k_B) exp[−(0.86 k_d/|k_B|)⁶] / (cos s_p cos s_n)
     /// ```
     ///
-    /// The last factor is the facet's area over its base. The exponential removes facets so steep toward the
-    /// radar that their Bragg wave is one of the long waves; those return the specular way. Facets turned away
-    /// (`θ_i` of 90° or more) return nothing.
+    /// The last factor is the facet's area over its base. The exponential removes facets so steep toward the radar that
+    /// their Bragg wave would be a long wave; those contribute to the specular return. Facets turned away (`θ_i` of 90° or
+    /// more) return nothing.
     ///
     /// - `slope` (`s_x`, `s_y`) along and across the look direction \[1\]
     ///
     /// # References
     ///
-    /// Romeiser et al. (1997), Eqs. 1–9, whose area weight is cos θ'/(cos θ cos `s_p`) instead: a projection on
-    /// the beam, which raises mean σ⁰ by at most 0.2 dB. Here σ⁰ is per unit area of sea.
+    /// Romeiser et al. (1997), Eqs. 1–9, but their area weight is cos θ'/(cos θ cos `s_p`), a projection on the beam, which
+    /// raises mean σ⁰ by at most 0.2 dB. Here σ⁰ is per unit area of sea.
     #[must_use]
     pub fn facet(&self, slope: [f64; 2]) -> f64 {
         self.facet_by(slope, f64::exp)
     }
 
-    /// [`Self::facet`] of slopes on a line, from `first` by `step`.
+    /// [`Self::facet`] for slopes on a line, from `first` in steps of `step`.
     pub(crate) fn facets(&self, first: [f64; 2], step: [f64; 2], out: &mut [f64]) {
         vectorized(
             #[inline(always)]
             || {
-                // What is written could be a part of the model, for all the compiler knows, but not of this copy.
+                // The compiler must assume that `out` aliases the model, but not this copy.
                 let model = self.clone();
                 for (n, value) in (0u32..).zip(out) {
                     let n = f64::from(n);
@@ -140,7 +140,7 @@ impl TwoScale {
         let k = bragg.map(|b| 2.0 * self.radar_wavenumber * b);
         let density = self.spectrum.density_by(k, self.wind, exp);
         let sigma = cross_section(self.radar_wavenumber, cos, gain, density) * passed * area;
-        // Where nothing passes the rest may be no number.
+        // Where nothing passes, the other factors may be NaN.
         if cos_look > 0.0 && passed > 0.0 {
             sigma
         } else {
@@ -148,14 +148,14 @@ impl TwoScale {
         }
     }
 
-    /// Share of the Bragg return that counts as such, from `sin²θ_i`.
+    /// Factor of the roll-off on the Bragg return, from `sin²θ_i`.
     #[inline(always)]
     fn roll_off(&self, sin2: f64, exp: impl Fn(f64) -> f64) -> f64 {
         let ratio2 = (0.5 * ROLL_OFF * SPLIT).powi(2) / sin2;
         exp(-ratio2 * ratio2 * ratio2)
     }
 
-    /// |g|² of a facet with the given shares of its own and of the other polarization.
+    /// |g|² of a facet with the given shares of the co-polarized and of the other coefficient.
     #[inline(always)]
     fn gain(&self, cos_incidence: f64, own: f64, other: f64) -> f64 {
         let g = coefficients(self.permittivity, cos_incidence);
@@ -165,22 +165,21 @@ impl TwoScale {
         }
     }
 
-    /// Mean Bragg cross-section of a facet over the waves it carries but does not resolve.
+    /// Mean Bragg σ⁰ of a facet over its unresolved slopes.
     ///
     /// ```text
     /// σ(s) = ∬ p(u) σ_facet(s + u) du,   p Gaussian
     /// ```
     ///
-    /// By direct quadrature on slopes 0.008 apart: slow, the oracle of the table. Its own relative error is below
-    /// 2e-7.
+    /// By direct quadrature on slopes 0.008 apart: slow, the reference for the table. Its own relative error is below 2e-7.
     ///
-    /// - `slope` s resolved slope \[1\]; `unresolved` covariance of u
+    /// - `slope` s, the resolved slope \[1\]; `unresolved`, the covariance of u
     #[must_use]
     pub fn tilt_averaged(&self, slope: [f64; 2], unresolved: &SlopeCovariance) -> f64 {
         self.average(slope, unresolved, FINE_SLOPES)
     }
 
-    /// [`Self::tilt_averaged`] on slopes `step` apart.
+    /// [`Self::tilt_averaged`] with slopes `step` apart.
     pub(crate) fn average(&self, slope: [f64; 2], unresolved: &SlopeCovariance, step: f64) -> f64 {
         let axes = unresolved.principal_axes();
         let [along, across] = axes.variance.map(|v| gaussian_nodes(v.sqrt(), step));
@@ -224,7 +223,7 @@ mod tests {
         )
     }
 
-    /// With vanishing slopes the average is the flat facet, and the flat facet is Bragg scattering.
+    /// With vanishing slopes the average equals the flat facet, which is plain Bragg scattering.
     #[test]
     fn no_slopes_leave_plain_bragg() {
         for polarization in [Polarization::VV, Polarization::HH] {
@@ -238,11 +237,11 @@ mod tests {
             };
             let density = model.spectrum.density([k, 0.0], [1.0, 0.0]);
             let plain = cross_section(model.radar_wavenumber, theta.cos(), gain, density);
-            // The roll-off takes (0.86 k_d/k_B)⁶ = 6.9e-5 at 32°.
+            // The roll-off removes (0.86 k_d/k_B)⁶ = 6.9e-5 at 32°.
             let flat = model.facet([0.0; 2]);
             assert!((flat / plain - 1.0 + 6.9e-5).abs() < 1e-6);
             assert!((model.tilt_averaged([0.0; 2], &SlopeCovariance::NONE) - flat).abs() < 1e-15);
-            // What the slopes add falls with their variance: first order.
+            // The contribution of the slopes falls in proportion to their variance.
             let added =
                 |v| model.tilt_averaged([0.0; 2], &SlopeCovariance::isotropic(v)) / flat - 1.0;
             let order = (added(1e-4) / added(1e-5)).log10();
@@ -250,7 +249,7 @@ mod tests {
         }
     }
 
-    /// The sense of tilt: the derivative of ln σ of a k⁻⁴ spectrum and large |ε| is 4 cot θ/(1 + sin²θ) for VV.
+    /// Sign of the tilt: for a k⁻⁴ spectrum and large |ε|, the derivative of ln σ is 4 cot θ/(1 + sin²θ) for VV.
     #[test]
     fn rising_away_from_the_radar_is_bright() {
         let model = model(32.0, Polarization::VV, 5.0);
@@ -258,12 +257,12 @@ mod tests {
         let slope = (model.facet([d, 0.0]) / model.facet([-d, 0.0])).ln() / (2.0 * d);
         let theta = 32f64.to_radians();
         let linear = 4.0 / theta.tan() / (1.0 + theta.sin().powi(2));
-        // The curvature spectrum of the model is not flat, which costs some per cent.
+        // The model's curvature spectrum is not flat, which accounts for a few per cent.
         assert!((slope / linear - 1.0).abs() < 0.1, "{slope} {linear}");
     }
 
-    /// A facet turned about the line of sight is the same facet: the cross-section depends on the angle between
-    /// normal and radar only, apart from polarization and the direction of the Bragg wave.
+    /// A facet turned about the line of sight is unchanged: the return depends only on the angle between normal and radar,
+    /// apart from polarization and the direction of the Bragg wave.
     #[test]
     fn tilt_geometry_is_that_of_the_normal() {
         let model = model(40.0, Polarization::VV, 7.0);
@@ -275,7 +274,7 @@ mod tests {
             let in_plane = (1.0 + sx * sx).sqrt();
             let cos_look = (cos + sin * sx) / in_plane;
             assert!((cos_look * in_plane / length - expected).abs() < 1e-15);
-            // Left and right are alike for a wind along the look direction.
+            // Left and right are equal for a wind along the look direction.
             let mirrored = model.facet([sx, -sy]);
             assert!((model.facet(slope) / mirrored - 1.0).abs() < 1e-12);
         }
@@ -291,8 +290,8 @@ mod tests {
         assert!(model.facet([1e8, 1e8]).is_finite());
     }
 
-    /// Facets on a line are the same facets, towards grazing and towards nadir, to the rounding of the exponent of the roll-off,
-    /// which is up to 700, and of what it takes to get there.
+    /// Facets on a line equal single facets, toward grazing and toward nadir, up to the rounding of the exponent of the
+    /// roll-off, which reaches 700, and of its argument.
     #[test]
     fn facets_on_a_line_are_facets() {
         for (degrees, polarization) in [(8.0, Polarization::VV), (35.0, Polarization::HH)] {
@@ -319,7 +318,7 @@ mod tests {
         }
     }
 
-    /// Pixels that resolve every tilting wave leave nothing to average.
+    /// Pixels that resolve every tilting wave leave no slopes to average.
     #[test]
     fn unresolved_slopes_end_at_the_split() {
         let model = model(32.0, Polarization::VV, 7.0);
@@ -332,8 +331,8 @@ mod tests {
         assert!(all.xx > part.xx && part.xx > part.yy && part.yy > 0.0);
     }
 
-    /// The oracle's own error: half the spacing of slopes changes nothing, for wide and narrow tilt, also where
-    /// the roll-off near nadir is in reach.
+    /// The reference's own error: halving the spacing of slopes changes nothing, for wide and narrow tilt, even where the
+    /// roll-off near nadir is within reach.
     #[test]
     fn tilt_average_has_converged() {
         for (degrees, variance) in [(16.0, 0.012), (16.0, 0.001), (40.0, 0.01), (70.0, 0.015)] {

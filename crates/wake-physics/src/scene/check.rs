@@ -1,17 +1,17 @@
-//! Every value against its closed range.
+//! Checks of every value of a scene against its closed range.
 
 use super::{Grid, HullForm, Radar, Scene, Sea, Ship};
 use crate::constants::GRAVITY;
 use crate::error::{Error, Result, finite, in_range};
 use crate::window::Window;
 
-/// Smallest radius of a turn over the longer of ship and transverse wave: chosen; waves follow their ray theory there.
+/// Smallest turning radius over the larger of ship length and transverse wavelength: chosen; waves follow ray theory there.
 const NARROWEST_TURN: f64 = 2.0;
 
-/// Largest radius of a turn \[m\]: chosen; over 3 km the track leaves the straight one by 45 m.
+/// Largest turning radius \[m\]: chosen; over 3 km the track deviates from a straight line by 45 m.
 const WIDEST_TURN: f64 = 1e5;
 
-/// Most ships of a scene: chosen; every one costs a wake.
+/// Largest number of ships in a scene: chosen; each adds the cost of a wake.
 const MOST_SHIPS: f64 = 100.0;
 
 impl Scene {
@@ -34,7 +34,7 @@ impl Scene {
 }
 
 impl Scene {
-    /// How a scene of `count` ships names its ship `n`, counted from 0: "ship" where it is alone, else "ship.1" and so on.
+    /// Name of ship `n`, counted from 0, in a scene of `count` ships: "ship" for a single ship, else "ship.1" and so on.
     pub(crate) fn ship_name(n: usize, count: usize) -> String {
         if count == 1 {
             return "ship".to_owned();
@@ -76,7 +76,7 @@ impl Sea {
 }
 
 impl Ship {
-    /// A turn must be wide for the ship and its waves, and no wider than any image shows.
+    /// Checks that the turning radius is large enough for the ship and its waves, and at most [`WIDEST_TURN`].
     fn validate_turn(&self, name: &str) -> Result<()> {
         if self.turn_rate == 0.0 {
             return Ok(());
@@ -102,7 +102,7 @@ impl Ship {
         })
     }
 
-    /// What only an echo or the edges of the wake have is refused without them.
+    /// Refuses keys that have no effect without an echo or without edges of the wake.
     fn validate_needless(&self, name: &str) -> Result<()> {
         let edge_time = self.edge_time.unwrap_or(0.0);
         let period = self.roll_period.unwrap_or(0.0);
@@ -134,7 +134,9 @@ impl Ship {
         }
     }
 
-    /// - `name`: what errors call it
+    /// Checks the values of a ship.
+    ///
+    /// - `name`: name of the ship in errors
     fn validate(&self, name: &str) -> Result<()> {
         let range = |key: &str, value, [min, max]: [f64; 2], unit| {
             in_range(&format!("{name}.{key}"), value, min, max, unit)
@@ -258,7 +260,7 @@ impl Radar {
         self.response()
     }
 
-    /// What only an impulse response has is refused without one.
+    /// Refuses keys that have no effect without an impulse response.
     fn response(&self) -> Result<()> {
         let needless = [
             ("radar.window", self.window.is_some()),
@@ -319,7 +321,7 @@ fn window(name: &str, window: Option<Window>) -> Result<()> {
 mod tests {
     use super::*;
 
-    /// Key, closed range, and values just outside it.
+    /// Keys and their closed ranges.
     const RANGES: [(&str, f64, f64); 43] = [
         ("grid.rows", 1.0, 16384.0),
         ("grid.columns", 1.0, 16384.0),
@@ -377,7 +379,7 @@ mod tests {
         (scene.radar.azimuth_ambiguity, scene.radar.prf) = (Some(-25.0), Some(1700.0));
         for ship in &mut scene.ships {
             (ship.echo, ship.edge) = (true, true);
-            // A hull on which every single value may take its extremes.
+            // A hull for which each key alone may take the ends of its range.
             (ship.length, ship.beam, ship.draft) = (300.0, 0.5, 0.5);
         }
         scene.with_assignments(&[format!("{key}={value}")])
@@ -539,7 +541,7 @@ mod tests {
         );
     }
 
-    /// 195 m at 10 m/s: 390 m to 100 km, so 1.469 degrees a second at most.
+    /// A ship of 195 m at 10 m/s turns on radii of 390 m to 100 km, so by at most 1.469 degrees a second.
     #[test]
     fn a_turn_is_wide_for_the_ship_and_its_waves() {
         let turned = |keys: &[&str]| Scene::default().with_assignments(keys);

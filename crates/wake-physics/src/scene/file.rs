@@ -7,7 +7,7 @@ use std::io::Read;
 use std::path::Path;
 use whole_files::{quoted, sentence};
 
-/// No scene file is longer than this \[bytes\].
+/// Largest size of a scene file \[bytes\].
 const LONGEST: u64 = 1 << 20;
 
 impl Scene {
@@ -28,7 +28,7 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// [`Error::File`] if the file cannot be read, is longer than 1 MiB or is no scene, else what [`Scene::validate`] finds.
+    /// [`Error::File`] if the file cannot be read, is longer than 1 MiB or is not a scene, else what [`Scene::validate`] finds.
     pub fn read(path: &Path) -> Result<Self> {
         let text = text_of(path).map_err(|e| Error::File {
             action: "read",
@@ -45,7 +45,7 @@ impl Scene {
         })
     }
 
-    /// The scene as the text of a scene file.
+    /// Returns the scene as the text of a scene file.
     ///
     /// # Errors
     ///
@@ -57,11 +57,11 @@ impl Scene {
         Ok(with_keys_of_files(&text))
     }
 
-    /// The scene with assignments such as `ship.speed=10` made, in order, then checked.
+    /// Applies assignments such as `ship.speed=10` in order, then checks the scene.
     ///
-    /// The value is TOML; a bare word is a string. `ship.speed` is that of the only ship; of several the first is
-    /// `ship.1.speed`. Setting a key of a ship where there is none, or of the number after the last, makes a default ship
-    /// first.
+    /// Values are TOML; a bare word is a string. `ship.speed` works with a single ship; with several, the first is
+    /// `ship.1.speed`. Setting a key of a ship in a scene without ships, or of the number after the last ship, first adds a
+    /// default ship.
     ///
     /// # Errors
     ///
@@ -110,8 +110,8 @@ impl Scene {
     }
 }
 
-/// The table of the ship that keys after `ship` name, and the keys after that: a number counts from 1, none is the only
-/// ship.
+/// Returns the table of the ship that the keys after `ship` name, and the remaining keys. Numbers count from 1; without a
+/// number, the keys are of the only ship.
 fn table_of_ship<'t, 'k>(
     root: &'t mut toml::Table,
     keys: &'k [&'k str],
@@ -147,7 +147,7 @@ fn table_of_ship<'t, 'k>(
     Ok((table, rest))
 }
 
-/// The text of a serialized scene with the keys of a scene file.
+/// Replaces the keys of a serialized scene by those of a scene file.
 fn with_keys_of_files(text: &str) -> String {
     let (mut out, mut radar) = (String::with_capacity(text.len() + 64), false);
     for line in text.lines() {
@@ -164,7 +164,7 @@ fn with_keys_of_files(text: &str) -> String {
     out
 }
 
-/// Takes away what a sensor sets.
+/// Removes the keys that a sensor sets.
 fn forget_radar(root: &mut toml::Table) {
     let mut forget = |table: &str, forgotten: fn(&str) -> bool| {
         if let Some(table) = root.get_mut(table).and_then(toml::Value::as_table_mut) {
@@ -175,7 +175,7 @@ fn forget_radar(root: &mut toml::Table) {
     forget("grid", |key| key == "spacing");
 }
 
-/// The text of a file that is no longer than a scene can be.
+/// Reads the text of a file of at most [`LONGEST`] bytes.
 fn text_of(path: &Path) -> std::io::Result<String> {
     let mut text = String::new();
     let file = std::fs::File::open(path)?;
@@ -186,7 +186,7 @@ fn text_of(path: &Path) -> std::io::Result<String> {
     Ok(text)
 }
 
-/// The message of an error of TOML on one line, with the number of the line it is about.
+/// Message of a TOML error on one line, with the number and text of the line that it is about.
 fn with_line(text: &str, error: &toml::de::Error) -> String {
     let message = sentence(&error.message().trim().replace('\n', ", "));
     let Some(span) = error.span() else {
@@ -198,7 +198,7 @@ fn with_line(text: &str, error: &toml::de::Error) -> String {
     format!("line {}, '{}': {message}", number + 1, quoted(line))
 }
 
-/// Parses a TOML value; what is no TOML value is a string; nothing is `None`.
+/// Parses a TOML value. Text that is not TOML is a string; empty text is `None`.
 fn toml_value(text: &str) -> Option<toml::Value> {
     if text.is_empty() {
         return None;
@@ -306,7 +306,7 @@ mod tests {
         assert_eq!(Scene::from_toml(&text).unwrap(), two);
         let json = serde_json::to_string(&two).unwrap();
         assert_eq!(serde_json::from_str::<Scene>(&json).unwrap(), two);
-        // One is a table, whichever way it came.
+        // A single ship is written as a table, even if it was read from a list.
         let one = Scene::from_toml("[[ship]]\nspeed = 8").unwrap();
         assert!(one.to_toml().unwrap().contains("[ship]\n"));
         assert_eq!(one, Scene::from_toml("[ship]\nspeed = 8").unwrap());
@@ -381,7 +381,7 @@ mod tests {
                 .with_assignments(&[format!("seed={seed}")])
                 .unwrap();
             assert_eq!(set.seed, seed);
-            // Another key does not mind it.
+            // Setting another key keeps the seed.
             assert_eq!(set.with_assignments(&["ship.speed=8"]).unwrap().seed, seed);
         }
         for seed in ["18446744073709551616", "-1", "1.5"] {
@@ -413,7 +413,7 @@ mod tests {
         }
     }
 
-    /// Whatever a file or an assignment holds, what is said of it is short, on one line and without control characters.
+    /// Whatever a file or an assignment holds, its error is short, on one line and without control characters.
     #[test]
     fn errors_are_short_and_harmless() {
         let long = "\u{1b}[31m\u{7}x".repeat(20_000);
@@ -440,7 +440,7 @@ mod tests {
         }
     }
 
-    /// A device that never ends, and a file that is too long, are read to the limit.
+    /// Endless devices and files that are too long are read only up to the limit.
     #[test]
     fn files_are_read_to_a_limit() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! Values that a file cannot hold as they are: no infinity in JSON, no whole number above 2⁶³ − 1 in TOML, and lists of
-//! two numbers that must not be three.
+//! Values with a form of their own in files: JSON has no infinity, TOML has no whole number above 2⁶³ − 1, and some lists
+//! must have exactly two numbers.
 
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serializer};
@@ -42,7 +42,7 @@ pub(super) mod depth {
     }
 }
 
-/// A seed as a number, or as a string of digits where TOML has no such number.
+/// A seed as a number, or as a string of digits if it is too large for TOML.
 pub(super) mod seed {
     use super::{Deserialize, Deserializer, Serializer};
 
@@ -80,7 +80,7 @@ pub(super) mod seed {
     }
 }
 
-/// No ship as nothing, one as a table, several as a list of tables.
+/// Ships: one as a table, several as a list of tables; without ships the key is absent.
 pub(super) mod ships {
     use super::super::Ship;
     use super::{Deserialize, Deserializer};
@@ -104,7 +104,7 @@ pub(super) mod ships {
         deserializer.deserialize_any(OneOrSeveral)
     }
 
-    /// Hands on what it finds, so that errors name the key and its line.
+    /// Deserializes from the map or list directly, so that errors name the key and its line.
     struct OneOrSeveral;
 
     impl<'de> Visitor<'de> for OneOrSeveral {
@@ -128,7 +128,7 @@ pub(super) mod ships {
     }
 }
 
-/// Exactly two numbers.
+/// Deserializes exactly two numbers.
 pub(super) fn two<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; 2], D::Error> {
     let numbers = Vec::<f64>::deserialize(deserializer)?;
     let count = numbers.len();

@@ -1,14 +1,14 @@
-//! The keys of a scene file: what is absent comes from the sensor, and where there is none from the defaults.
+//! Keys of a scene file. Absent keys take the values of the sensor or, without a sensor, the defaults.
 
 use super::forms;
 use super::{Grid, Model, Polarization, Radar, Scene, Sea, Sensor, Ship, default_seed};
 use crate::window::Window;
 use serde::Deserialize;
 
-/// Azimuth ambiguities over a ship's echo where a sensor is named \[dB\]: chosen from −20 to −30.
+/// Level of azimuth ambiguities relative to a ship's echo where a sensor is named \[dB\]: chosen from −20 to −30.
 const AMBIGUITY: f64 = -25.0;
 
-/// A scene as it is written.
+/// A scene as written in a file.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields, rename = "Scene")]
 pub(super) struct SceneKeys {
@@ -42,7 +42,7 @@ struct GridKeys {
     oversampling: Option<u32>,
 }
 
-/// The keys of the radar, each with how an absent one is taken from another radar.
+/// Keys of the radar, each with the method that replaces an absent value by that of another radar.
 macro_rules! radar_keys {
     ($($(#[$alias:meta])? $key:ident: $type:ty, $or:ident;)*) => {
         #[derive(Debug, Default, Deserialize)]
@@ -54,7 +54,7 @@ macro_rules! radar_keys {
         }
 
         impl RadarKeys {
-            /// A radar with these keys, and all others of `base`.
+            /// Returns a radar with these keys, and with the values of `base` for absent keys.
             fn over(self, base: Radar) -> Radar {
                 Radar {
                     sensor: self.sensor,
@@ -87,7 +87,7 @@ radar_keys! {
     paired_echoes: f64, or;
 }
 
-/// Keys of the radar in a scene file, and the names under which serialized scenes have them.
+/// Keys of the radar in a scene file, and their names in serialized scenes.
 pub(super) const STORED: [(&str, &str); 4] = [
     ("azimuth_resolution", "resolution"),
     ("nesz", "noise_floor"),
@@ -95,7 +95,7 @@ pub(super) const STORED: [(&str, &str); 4] = [
     ("prf", "pulse_rate"),
 ];
 
-/// The path of a key in a serialized scene: `radar.noise_floor` for `radar.nesz`; most keys have one name.
+/// Path of a key in a serialized scene, such as `radar.noise_floor` for `radar.nesz`; most paths are the same.
 #[must_use]
 pub fn stored_key(path: &str) -> String {
     let key = path.strip_prefix("radar.");
@@ -105,7 +105,7 @@ pub fn stored_key(path: &str) -> String {
     }
 }
 
-/// The one key of the radar that no sensor sets.
+/// The one key of the radar that is kept when a sensor is assigned.
 pub(super) const NOT_SET_BY_SENSOR: &str = "relaxation_rate";
 
 impl From<SceneKeys> for Scene {
@@ -195,7 +195,7 @@ mod tests {
         }
     }
 
-    /// Assignments count in order: a sensor replaces the radar before it, a key after it wins.
+    /// Assignments apply in order: a sensor replaces the radar keys set before it, and keys set after it override the sensor.
     #[test]
     fn assigning_a_sensor_replaces_the_radar() {
         let scene = Scene::default()
@@ -207,14 +207,14 @@ mod tests {
             .unwrap();
         assert_eq!((scene.radar.looks, scene.radar.frequency), (3, 6e9));
         assert_eq!(scene.grid.spacing, 12.5);
-        // What no sensor sets stays.
+        // The key that no sensor sets is kept.
         let kept = Scene::default()
             .with_assignments(&["radar.relaxation_rate=2", "radar.sensor=ers-2-pri"])
             .unwrap();
         assert_eq!(kept.radar.relaxation_rate, Some(2.0));
     }
 
-    /// The first names of keys and terms are read as before; files are written with the new ones, JSON with the first.
+    /// Older names of keys and terms can be read; scene files are written with the new names, JSON with the older ones.
     #[test]
     fn keys_of_two_names_are_one() {
         let [first, new] = [
@@ -241,7 +241,7 @@ mod tests {
                 format!("radar.{stored}")
             );
             assert_eq!(stored_key(key), key);
-            // Either name replaces the value.
+            // An assignment to either name replaces the value.
             let value = match key {
                 "azimuth_resolution" => 8,
                 "prf" => 2000,
@@ -270,7 +270,7 @@ mod tests {
         );
     }
 
-    /// Every field of the radar but one is set by a sensor; a new one must be set, too, or be named here.
+    /// A sensor sets every optional field named here, and not the relaxation rate.
     #[test]
     fn a_sensor_sets_all_but_one_key() {
         let mut radar = of_sensor(Sensor::Sentinel1Iw, None);

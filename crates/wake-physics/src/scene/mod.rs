@@ -1,4 +1,4 @@
-//! The scene: what is simulated, in the units and ranges of a scene file.
+//! The scene: ships, sea, radar and grid, in the units and ranges of a scene file.
 
 mod check;
 mod file;
@@ -16,22 +16,22 @@ pub use polarization::Polarization;
 pub use sensor::Sensor;
 use serde::{Deserialize, Serialize};
 
-/// A ship, a sea and a radar over a grid of pixels.
+/// Ships, sea and radar over a grid of pixels.
 ///
-/// The same type reads and writes scene files (TOML). Unknown keys are errors; an absent table takes its
-/// defaults, except `[ship]`: no table, no ship. Several ships are a list of tables, `[[ship]]`. [`Scene::default`] has
-/// the default ship. Where `radar.sensor` names a satellite, it sets what no key beside it does, [`Grid::spacing`] too.
+/// The same type reads and writes scene files (TOML). Unknown keys are errors. Absent tables take their defaults, except
+/// `[ship]`: without it there is no ship. Several ships are a list of tables, `[[ship]]`. [`Scene::default`] has one
+/// default ship. `radar.sensor` sets the radar's keys and [`Grid::spacing`], except those that the file sets.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(from = "keys::SceneKeys")]
 pub struct Scene {
-    /// Seed of the random sea and of the speckle; from 2⁶³ on, a file holds it as a string of digits.
+    /// Seed of the random sea and of the speckle. In files, values of 2⁶³ and above are strings of digits.
     #[serde(with = "forms::seed")]
     pub seed: u64,
-    /// The pixels.
+    /// Pixels of the image.
     pub grid: Grid,
     /// Wind and waves.
     pub sea: Sea,
-    /// The ships, at most 100; a file holds one as a table and several as a list, both named `ship`.
+    /// Ships, at most 100. In files, one ship is a table and several are a list of tables, both named `ship`.
     #[serde(
         rename = "ship",
         serialize_with = "forms::ships::serialize",
@@ -40,7 +40,7 @@ pub struct Scene {
     pub ships: Vec<Ship>,
     /// The radar and its platform.
     pub radar: Radar,
-    /// Which terms are computed, and how well.
+    /// Terms that are computed, and their tolerance.
     pub model: Model,
 }
 
@@ -64,14 +64,14 @@ impl Default for Scene {
 /// The pixels of the image.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Grid {
-    /// Pixels along azimuth, 1 to 16384.
+    /// Number of pixels along azimuth, 1 to 16384.
     pub rows: usize,
-    /// Pixels along ground range, 1 to 16384.
+    /// Number of pixels along ground range, 1 to 16384.
     pub columns: usize,
     /// Pixel size \[m\], 0.1 to 100.
     pub spacing: f64,
-    /// Pixels that are computed along each side of one of the image, 1 to 16; chosen by the plan where absent. An impulse
-    /// response has at least as many as carry it.
+    /// Number of computed pixels along each side of an image pixel, 1 to 16; chosen by the plan where absent. With an
+    /// impulse response, at least the number that its bandwidth requires.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub oversampling: Option<u32>,
 }
@@ -93,7 +93,7 @@ impl Default for Grid {
 pub struct Sea {
     /// Wind speed at 10 m height [m/s], 0 to 30; 0 is a flat sea.
     pub wind_speed: f64,
-    /// Where the wind blows to [deg clockwise from azimuth]; 90 is away from the radar.
+    /// Direction toward which the wind blows [deg clockwise from azimuth]; 0° is along the flight, 90° away from the radar.
     pub wind_toward: f64,
     /// Distance over which the wind has blown \[m\], 100 to 1e7.
     pub fetch: f64,
@@ -101,7 +101,7 @@ pub struct Sea {
     pub spectrum: SpectrumModel,
     /// Directional spreading of the resolved waves.
     pub spreading: SpreadingModel,
-    /// Water depth \[m\], 1 to infinite (`inf`, or the word "infinite" where a format has no infinity).
+    /// Water depth \[m\], 1 to infinite (`inf`, or "infinite" in formats without infinity).
     #[serde(with = "forms::depth")]
     pub depth: f64,
     /// Time \[s\], 0 to 1e5; moves sea, ship and wake together.
@@ -110,28 +110,28 @@ pub struct Sea {
     pub temperature: f64,
     /// Salinity \[psu\], 0 to 45.
     pub salinity: f64,
-    /// Standard deviation of the logarithm of the wind speed in gusts \[1\], 0 to 0.5; 0: none. See [`crate::gusts`].
+    /// Standard deviation of the logarithm of the wind speed in gusts \[1\], 0 to 0.5; 0: no gusts. See [`crate::gusts`].
     pub gust_strength: f64,
     /// Outer scale of the gusts \[m\], 100 to 50,000.
     pub gust_scale: f64,
-    /// Standard deviation of the logarithm of the wind speed in the eddies of the surface layer \[1\], 0 to 0.5; 0: none. See
-    /// [`crate::gusts`].
+    /// Standard deviation of the logarithm of the wind speed in the eddies of the surface layer \[1\], 0 to 0.5; 0: no
+    /// eddies. See [`crate::gusts`].
     pub mottle_strength: f64,
-    /// Outer scale of these eddies \[m\], 20 to 5000.
+    /// Outer scale of the eddies of the surface layer \[m\], 20 to 5000.
     pub mottle_scale: f64,
-    /// Significant height of a swell \[m\], 0 to 15; 0: none. See [`crate::swell`].
+    /// Significant wave height of the swell \[m\], 0 to 15; 0: no swell. See [`crate::swell`].
     pub swell_height: f64,
-    /// Wavelength of the swell's peak \[m\], 30 to 1000.
+    /// Peak wavelength of the swell \[m\], 30 to 1000.
     pub swell_length: f64,
-    /// Where the swell goes to [deg clockwise from azimuth].
+    /// Direction toward which the swell travels [deg clockwise from azimuth].
     pub swell_toward: f64,
-    /// Whether breaking waves add to the return. See [`crate::scattering::breaking`].
+    /// Whether breaking waves add to the radar return. See [`crate::scattering::breaking`].
     pub breaking: bool,
-    /// Damping of the short waves in slicks \[1\], 0 to 1; 0: none. See [`crate::slicks`].
+    /// Damping of the short waves in slicks \[1\], 0 to 1; 0: no slicks. See [`crate::slicks`].
     pub slick_damping: f64,
     /// Full width of a slick \[m\], 5 to 1000.
     pub slick_width: f64,
-    /// Length over which slicks wind \[m\], 100 to 50,000.
+    /// Length scale on which slicks meander \[m\], 100 to 50,000.
     pub slick_scale: f64,
 }
 
@@ -200,12 +200,13 @@ pub struct Ship {
     pub draft: f64,
     /// Speed U [m/s], 0 to 40.
     pub speed: f64,
-    /// Direction of travel at time 0 [deg clockwise from azimuth].
+    /// Direction of travel at time 0 [deg clockwise from azimuth]; 0° is along the flight, 90° away from the radar.
     pub heading: f64,
-    /// Turn rate [deg/s], −10 to 10, positive to starboard; 0: straight on. It has turned by half a circle, and came
-    /// straight before. The radius is at least two lengths of the ship and of its transverse waves, at most 100 km.
+    /// Turn rate [deg/s], −10 to 10, positive to starboard; 0: a straight track. The ship came straight and has turned
+    /// through half a circle. The radius must be at least twice the ship's length and twice its transverse wavelength, and
+    /// at most 100 km.
     pub turn_rate: f64,
-    /// Midship (x, y) at time 0 \[m\].
+    /// Position (x, y) of midship at time 0 \[m\].
     #[serde(deserialize_with = "forms::two")]
     pub position: [f64; 2],
     /// Form of the hull.
@@ -213,39 +214,39 @@ pub struct Ship {
     /// Block coefficient of the full hull, 0.45 to 0.9; 0.8 where absent; only with `hull = "full"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub block_coefficient: Option<f64>,
-    /// Whether the radar echo of the ship itself is drawn.
+    /// Whether the image contains the radar echo of the ship itself.
     pub echo: bool,
-    /// Weights the wake's spectrum with `exp(−k·filter_depth)` \[m\], 0 to 20.
+    /// Depth of the low-pass filter `exp(−k·filter_depth)` on the wake's spectrum \[m\], 0 to 20.
     pub filter_depth: f64,
-    /// Largest slope of a wave of the wake, one length astern of midship \[1\], 0.02 to 1: steeper waves break. No limit where
-    /// absent. See [`crate::kelvin`].
+    /// Largest wave slope in the wake one ship length astern of midship \[1\], 0.02 to 1: steeper waves break. No limit
+    /// where absent. See [`crate::kelvin`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub steepness: Option<f64>,
-    /// Damping of the Bragg waves at the stern in the middle of the turbulent wake \[1\], 0 to 1; with `recovery = "wind"` in a
-    /// wind of 5 m/s. See [`crate::turbulent`].
+    /// Damping of the Bragg waves at the stern on the centreline of the turbulent wake \[1\], 0 to 1; with
+    /// `recovery = "wind"`, its value in a wind of 5 m/s. See [`crate::turbulent`].
     pub damping: f64,
-    /// How damping and edges of the turbulent wake follow the wind.
+    /// Dependence of the turbulent wake's damping and bright edges on the wind.
     pub recovery: Recovery,
     /// Whether the turbulent wake has a current and bright edges. See [`crate::turbulent::current`].
     pub edge: bool,
-    /// Response of σ⁰ to the convergence of that current \[s\], 0 to 1000; from wind and radar where absent; only with
-    /// [`Self::edge`].
+    /// Response time of σ⁰ to the convergence of the turbulent wake's current \[s\], 0 to 1000; computed from wind and radar
+    /// where absent; only with [`Self::edge`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub edge_time: Option<f64>,
-    /// Outflow from the wake's middle at the stern [m/s], 0 to 0.3; only with [`Self::edge`].
+    /// Speed of the outflow from the turbulent wake's centreline at the stern [m/s], 0 to 0.3; only with [`Self::edge`].
     pub edge_outflow: f64,
-    /// Standard deviation of the line-of-sight velocity of points on the ship by roll and pitch [m/s], 0 to 2; only with
+    /// Standard deviation of the line-of-sight velocity that roll and pitch give points on the ship [m/s], 0 to 2; only with
     /// [`Self::echo`].
     pub roll: f64,
-    /// Period of roll and pitch \[s\], 4 to 60: the points accelerate while the radar integrates, which defocuses the echo. They keep
-    /// their velocity where absent; only with [`Self::echo`].
+    /// Period of roll and pitch \[s\], 4 to 60: points on the ship accelerate while the radar integrates, which defocuses the
+    /// echo. Where absent, their velocities are constant; only with [`Self::echo`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub roll_period: Option<f64>,
-    /// Number of points that the echo consists of, 1 to 1000; 12 where absent; only with [`Self::echo`].
+    /// Number of point scatterers in the echo, 1 to 1000; 12 where absent; only with [`Self::echo`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scatterers: Option<u32>,
-    /// Power around the echo over the power of its points \[dB\], −40 to 0; none where absent; only with [`Self::echo`]. See
-    /// [`crate::sar::halo`].
+    /// Power of the halo around the echo relative to the power of its point scatterers \[dB\], −40 to 0; no halo where
+    /// absent; only with [`Self::echo`]. See [`crate::sar::halo`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub halo: Option<f64>,
 }
@@ -279,7 +280,7 @@ impl Default for Ship {
 }
 
 impl Ship {
-    /// Curvature of its track [1/m], positive to starboard; 0 on a straight one.
+    /// Curvature of the ship's track [1/m], positive to starboard; 0 on a straight track.
     pub(crate) fn curvature(&self) -> f64 {
         if self.turn_rate == 0.0 {
             return 0.0;
@@ -287,21 +288,21 @@ impl Ship {
         self.turn_rate.to_radians() / self.speed
     }
 
-    /// Where it moves to at a time \[s\] [deg clockwise from azimuth].
+    /// Heading at a time \[s\] [deg clockwise from azimuth].
     pub(crate) fn heading_at(&self, time: f64) -> f64 {
         self.heading + self.turn_rate * time
     }
 }
 
-/// How damping and edges of a turbulent wake follow the wind.
+/// Dependence of a turbulent wake's damping and bright edges on the wind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Recovery {
-    /// Not at all: damping and a given response of the edges are the same in every wind.
+    /// None: damping and a given response time of the edges are the same in every wind.
     #[default]
     Constant,
-    /// The wind restores the damped waves: damping, its length and the response of the edges fall with wind.
+    /// The wind restores the damped waves: damping, its length and the response time of the edges decrease with wind speed.
     Wind,
 }
 
@@ -316,9 +317,9 @@ pub enum HullForm {
     Full,
 }
 
-/// The radar and its platform; it looks toward +x.
+/// The radar and its platform; the radar looks toward +x.
 ///
-/// Serialized scenes (reports, manifests, weights) keep the first names of four keys, `resolution`, `noise_floor`, `ambiguity`
+/// Serialized scenes (reports, manifests, weights) keep the older names of four keys, `resolution`, `noise_floor`, `ambiguity`
 /// and `pulse_rate`; [`Scene::to_toml`] writes the names of the fields, and every reader accepts both.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Radar {
@@ -327,29 +328,30 @@ pub struct Radar {
     pub sensor: Option<Sensor>,
     /// Frequency \[Hz\], 1e9 to 2e10.
     pub frequency: f64,
-    /// Polarization, sent and received.
+    /// Transmit and receive polarization.
     pub polarization: Polarization,
     /// Incidence angle \[deg\], 5 to 75.
     pub incidence: f64,
-    /// Range over platform speed R/V \[s\], 0 to 200.
+    /// Ratio R/V of slant range and platform speed \[s\], 0 to 200.
     pub range_to_velocity: f64,
     /// Single-look azimuth resolution \[m\], 0.5 to 100.
     #[serde(rename(serialize = "resolution"))]
     pub azimuth_resolution: f64,
-    /// Resolution of one look in ground range \[m\], 0.5 to 500. Where absent it is the pixel and every pixel has its own
-    /// speckle; with it the image has the radar's impulse response in both axes, see [`crate::sar::impulse`].
+    /// Single-look resolution in ground range \[m\], 0.5 to 500. With it, the image has the radar's impulse response along
+    /// both axes, see [`crate::sar::impulse`]. Where absent, the pixel is the resolution, with speckle of its own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range_resolution: Option<f64>,
-    /// Window over the bandwidth in range, and in azimuth where [`Self::azimuth_window`] is absent; uniform where absent.
-    /// Only with a range resolution, as the four that follow.
+    /// Window over the bandwidth in range, and in azimuth where [`Self::azimuth_window`] is absent; uniform where absent;
+    /// only with [`Self::range_resolution`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub window: Option<Window>,
-    /// Window over the bandwidth in azimuth.
+    /// Window over the bandwidth in azimuth; [`Self::window`] where absent; only with [`Self::range_resolution`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub azimuth_window: Option<Window>,
     /// Number of looks, 1 to 1000.
     pub looks: u32,
-    /// Share of its band that a look has in common with the next, 0 to 0.9; 0 where absent.
+    /// Overlap of adjacent looks as a share of a look's band, 0 to 0.9; 0 where absent; only with
+    /// [`Self::range_resolution`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub look_overlap: Option<f64>,
     /// Noise-equivalent σ⁰ \[dB\], −60 to 20, added before the speckle; no noise where absent.
@@ -358,24 +360,27 @@ pub struct Radar {
         skip_serializing_if = "Option::is_none"
     )]
     pub nesz: Option<f64>,
-    /// Level of the ship's azimuth ambiguities over its echo \[dB\], −60 to 0; none where absent.
+    /// Level of the ship's azimuth ambiguities relative to its echo \[dB\], −60 to 0; none where absent; only with
+    /// [`Self::range_resolution`] and [`Self::prf`].
     #[serde(
         rename(serialize = "ambiguity"),
         skip_serializing_if = "Option::is_none"
     )]
     pub azimuth_ambiguity: Option<f64>,
-    /// Pulse repetition frequency \[Hz\], 100 to 20,000: places the ambiguities; only with them.
+    /// Pulse repetition frequency \[Hz\], 100 to 20,000, which places the azimuth ambiguities; only with
+    /// [`Self::azimuth_ambiguity`].
     #[serde(
         rename(serialize = "pulse_rate"),
         skip_serializing_if = "Option::is_none"
     )]
     pub prf: Option<f64>,
-    /// Power of the paired echoes of a ship's brightest points over the power of these points \[dB\], −40 to 0: a cross along range and
-    /// azimuth; none where absent. See [`crate::sar::paired_echoes`].
+    /// Power of the paired echoes of a ship's brightest points relative to the power of these points \[dB\], −40 to 0: a
+    /// cross along range and azimuth; none where absent; only with [`Self::range_resolution`]. See
+    /// [`crate::sar::paired_echoes`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub paired_echoes: Option<f64>,
-    /// Relaxation rate of the Bragg waves [1/s], 0.01 to 100, in the hydrodynamic modulation and at the edges of wakes; from
-    /// the Bragg wave and the wind where absent.
+    /// Relaxation rate of the Bragg waves [1/s], 0.01 to 100, for the hydrodynamic modulation and the bright edges of
+    /// wakes; computed from the Bragg waves and the wind where absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub relaxation_rate: Option<f64>,
 }

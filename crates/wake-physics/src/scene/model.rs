@@ -1,15 +1,15 @@
-//! Which terms are computed, and how well.
+//! Terms of the physics that are computed, and their tolerance.
 
 use serde::{Deserialize, Serialize};
 
-/// Which terms are computed, and how well.
+/// Terms that are computed, and their tolerance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Model {
-    /// The terms.
+    /// Terms of the physics that are computed.
     pub terms: Terms,
-    /// Largest error asked for \[1\], 1e-6 to 0.1: for every field relative to its root mean square, for the
-    /// image before speckle as root mean square relative to its mean.
+    /// Error tolerance \[1\], 1e-6 to 0.1: the largest error of every field relative to its root mean square,
+    /// and the root mean square error of the image before speckle relative to its mean.
     pub tolerance: f64,
 }
 
@@ -23,7 +23,7 @@ impl Default for Model {
 }
 
 impl Terms {
-    /// Whether a term may be computed: a list that does not name it forbids it.
+    /// Whether a term may be computed: only a list that lacks the term forbids it.
     #[must_use]
     pub fn allow(&self, term: Term) -> bool {
         match self {
@@ -33,7 +33,7 @@ impl Terms {
     }
 }
 
-/// Which terms are computed: a rule, or a list.
+/// Terms that are computed: by a rule, or a list.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(
     untagged,
@@ -42,27 +42,27 @@ impl Terms {
 pub enum Terms {
     /// By a rule.
     Rule(TermRule),
-    /// Exactly these.
+    /// Only the terms of a list.
     List(Vec<Term>),
 }
 
-/// Choice of the terms.
+/// Rule that selects the terms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TermRule {
-    /// Those that change the image by more than the tolerance.
+    /// Terms that change the image by more than the tolerance.
     Needed,
-    /// All that the scene has.
+    /// All terms of the scene.
     All,
 }
 
-/// The terms in the order of the data flow: each with its name in scene files and reports, and its first name if it had
-/// another.
+/// The terms in the order of the data flow: each with its name in scene files and reports, and its older name if there is
+/// one.
 macro_rules! terms {
     ($($(#[doc = $doc:literal])* $term:ident = $name:literal $(| $first:literal)?,)*) => {
         /// One physical effect that can be computed or left out.
         ///
-        /// Scene files may also use the first names of some terms: `unresolved`, `edge`, `bunching`, `coherence`, `response`.
+        /// Scene files may also use the older names of some terms: `unresolved`, `edge`, `bunching`, `coherence`, `response`.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
         #[non_exhaustive]
         pub enum Term {
@@ -91,7 +91,7 @@ terms! {
     Swell = "swell",
     /// The Kelvin wake.
     Kelvin = "kelvin",
-    /// The ship's waves that the computed pixels do not carry, as slopes and velocities of a variance: with an impulse
+    /// The ship's waves too short for the computed pixels, as variances of slopes and velocities; only with an impulse
     /// response.
     SubpixelWake = "subpixel_wake" | "unresolved",
     /// The turbulent wake.
@@ -110,7 +110,7 @@ terms! {
     Gusts = "gusts",
     /// Layover of elevated points toward the radar.
     RangeBunching = "range_bunching",
-    /// Modulation of the Bragg waves by the currents of longer ones.
+    /// Modulation of the Bragg waves by the currents of longer waves.
     Hydrodynamic = "hydrodynamic",
     /// Azimuth shift by the line-of-sight velocity.
     VelocityBunching = "velocity_bunching" | "bunching",
@@ -128,7 +128,7 @@ terms! {
 mod tests {
     use super::*;
 
-    /// The message about a wrong term names all of them, and files spell each as its name.
+    /// The error of a wrong term lists all terms, and each is serialized as its name.
     #[test]
     fn terms_have_their_names() {
         let error = serde_json::from_str::<Terms>("3").unwrap_err().to_string();

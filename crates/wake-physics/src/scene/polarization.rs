@@ -2,11 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Polarization, sent and received.
+/// Transmit and receive polarization.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Polarization {
-    /// Vertical both ways.
+    /// Vertical on transmit and receive.
     VV,
-    /// Horizontal both ways.
+    /// Horizontal on transmit and receive.
     HH,
 }

@@ -1,4 +1,4 @@
-//! Imaging satellites: what each sets of a radar, with where every number is from.
+//! Imaging satellites: the radar keys that each mode sets, with the source of every number.
 
 use super::polarization::Polarization;
 use crate::constants::SPEED_OF_LIGHT;
@@ -11,15 +11,15 @@ const EARTH_RADIUS: f64 = 6.371e6;
 /// Gravitational constant times the mass of the Earth [m³/s²] (IAU 2015 nominal value).
 const EARTH_GRAVITY: f64 = 3.986_004e14;
 
-/// Noise-equivalent cross-section where nothing is published that was read \[dB\]: chosen.
+/// Noise-equivalent cross-section where no published value was found \[dB\]: chosen.
 const CHOSEN_NOISE: f64 = -22.0;
 
-/// Resolution in range \[m\], by what stays over the swath.
+/// Resolution in range \[m\], constant over the swath either in slant range or in ground range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RangeResolution {
     /// In slant range: one bandwidth for the whole swath.
     Slant(f64),
-    /// In ground range: bandwidths follow the incidence.
+    /// In ground range: the bandwidth changes with incidence.
     Ground(f64),
 }
 
@@ -29,23 +29,23 @@ pub enum RangeResolution {
 pub struct SensorMode {
     /// Frequency \[Hz\].
     pub frequency: f64,
-    /// Polarization where the scene names none.
+    /// Polarization, unless the scene sets it.
     pub polarization: Polarization,
     /// Height of the orbit over a spherical Earth \[m\].
     pub altitude: f64,
-    /// Incidence where the scene names none, and the range the mode images \[deg\].
+    /// Incidence \[deg\], unless the scene sets it.
     pub incidence: f64,
-    /// Nearest and farthest incidence \[deg\].
+    /// Smallest and largest incidence that the mode images \[deg\].
     pub incidence_range: [f64; 2],
     /// Pixel spacing in ground range and azimuth \[m\].
     pub spacing: f64,
-    /// Resolution in range of one look; see [`Self::range_resolution_at`].
+    /// Single-look resolution in range; see [`Self::range_resolution_at`].
     pub range_resolution: RangeResolution,
-    /// Resolution in azimuth \[m\], of one look.
+    /// Single-look resolution in azimuth \[m\].
     pub azimuth_resolution: f64,
     /// Windows in range and azimuth.
     pub windows: [Window; 2],
-    /// Number of looks and the share of its band that each has in common with the next.
+    /// Number of looks, and the overlap of adjacent looks as a share of a look's band.
     pub looks: (u32, f64),
     /// Noise-equivalent cross-section σ⁰ \[dB\].
     pub nesz: f64,
@@ -68,7 +68,7 @@ macro_rules! sensors {
             /// Every sensor.
             pub const ALL: [Self; [$($name),*].len()] = [$(Self::$sensor),*];
 
-            /// Numbers of the mode. Those marked "chosen" in the source are of the right size, not from a document.
+            /// Returns the numbers of the mode. Those marked "chosen" in the source are plausible, but not from a document.
             #[must_use]
             pub fn mode(self) -> SensorMode {
                 match self {
@@ -96,10 +96,10 @@ sensors! {
     AlosFbs = "alos-fbs" => alos_fbs(),
 }
 
-/// Interferometric wide swath, ground range detected, high resolution; alike on Sentinel-1A to 1D, whose radars and orbits are the same.
+/// Interferometric wide swath, ground range detected, high resolution; Sentinel-1A to 1D have the same radar and orbit.
 ///
 /// Frequency, windows, looks and overlap (3.5 of 14.1 MHz), noise, pulse rate (of IW1) and resolution: annotation of a
-/// product of 12 June 2022. Azimuth is unwindowed, as its sea was measured.
+/// product of 12 June 2022. Azimuth has no window, as measured in its image of the sea.
 fn sentinel_1_iw() -> SensorMode {
     SensorMode {
         frequency: 5.405e9,
@@ -108,7 +108,7 @@ fn sentinel_1_iw() -> SensorMode {
         incidence: 38.7,
         incidence_range: [30.1, 46.0],
         spacing: 10.0,
-        // 14.1 MHz and Hamming 0.70 in the first sub-swath; the bandwidths of the others leave 19.6 and 19.5 m.
+        // 14.1 MHz and Hamming 0.70 in the first sub-swath; the bandwidths of the others give 19.6 and 19.5 m.
         range_resolution: RangeResolution::Ground(20.3),
         azimuth_resolution: 18.4,
         windows: [Window::Hamming(0.70), Window::Uniform],
@@ -170,8 +170,8 @@ fn cosmo_skymed_hi() -> SensorMode {
     }
 }
 
-/// Himage stripmap as delivered: detected, multi-looked to 5 m, in ground range (DGM). Resolution, spacing, looks: the mission's product
-/// description, quoted from memory, not verified. The rest as [`cosmo_skymed_hi`].
+/// Himage stripmap as delivered: detected, multi-looked to 5 m, in ground range (DGM). Resolution, spacing, looks: the
+/// mission's product description, quoted from memory, not verified. The rest as [`cosmo_skymed_hi`].
 fn cosmo_skymed_dgm() -> SensorMode {
     SensorMode {
         spacing: 2.5,
@@ -246,7 +246,7 @@ fn radarsat_2_s() -> SensorMode {
         incidence: 36.0,
         incidence_range: [20.0, 52.0],
         spacing: 12.5,
-        // Within the table's 26.8 to 17.3 m from the nearest to the farthest beam: beams have bandwidths of their own.
+        // Within the table's 26.8 to 17.3 m from the nearest to the farthest beam: each beam has its own bandwidth.
         range_resolution: RangeResolution::Ground(21.0),
         azimuth_resolution: 24.7,
         windows: [Window::Hamming(0.75); 2],
@@ -292,13 +292,13 @@ fn ers_2_pri() -> SensorMode {
     }
 }
 
-/// One slant resolution for the swath, given as that in ground range \[m\] at an incidence \[deg\].
+/// Constant resolution in slant range, given in ground range \[m\] at an incidence \[deg\].
 fn slant(ground: f64, incidence: f64) -> RangeResolution {
     RangeResolution::Slant(ground * incidence.to_radians().sin())
 }
 
 impl SensorMode {
-    /// Range over platform speed R/V \[s\] at an incidence \[deg\], see [`range_to_velocity`].
+    /// Ratio R/V of slant range and platform speed \[s\] at an incidence \[deg\], see [`range_to_velocity`].
     #[must_use]
     pub fn range_to_velocity_at(&self, incidence: f64) -> f64 {
         range_to_velocity(self.altitude, incidence.to_radians())
@@ -314,14 +314,14 @@ impl SensorMode {
     }
 }
 
-/// Slant range R over the platform's speed V \[s\]: the azimuth displacement on the ground of 1 m/s along the line of sight.
+/// Ratio R/V of slant range and platform speed \[s\]: azimuth displacement on the ground per 1 m/s along the line of sight.
 ///
 /// ```text
 /// R = √((r + h)² − r² sin²θ) − r cos θ,     V = √(GM/(r + h))
 /// ```
 ///
-/// a circular orbit at the height h over a sphere of radius r. A point that approaches at u shifts in time by
-/// u R/(V `V_g`), with `V_g` the speed of the beam on the ground, and by u R/V there.
+/// for a circular orbit at the height h over a sphere of radius r. A point that approaches at the speed u is shifted in time
+/// by u R/(V `V_g`), with `V_g` the speed of the beam on the ground, so by u R/V on the ground.
 ///
 /// - `altitude` h \[m\]; `incidence` θ \[rad\], at the ground, 0 to π/2
 #[must_use]
@@ -332,7 +332,7 @@ pub fn range_to_velocity(altitude: f64, incidence: f64) -> f64 {
     range / (EARTH_GRAVITY / orbit).sqrt()
 }
 
-/// Azimuth distance of the first ambiguity \[m\]: what one pulse rate of Doppler displaces.
+/// Azimuth distance of the first ambiguity \[m\]: the displacement by a Doppler shift of one pulse repetition frequency.
 ///
 /// ```text
 /// Δy = PRF λ β/2,     β = R/V
@@ -348,7 +348,7 @@ pub fn slant_resolution(bandwidth: f64, window: Window) -> f64 {
     window.width() * SPEED_OF_LIGHT / (2.0 * bandwidth)
 }
 
-/// Ground range \[m\] of a length in slant range \[m\] at an incidence \[deg\]: resolutions and pixels alike.
+/// Length in ground range \[m\] of a length in slant range \[m\], such as a resolution, at an incidence \[deg\].
 #[must_use]
 pub fn ground_range(slant: f64, incidence: f64) -> f64 {
     slant / incidence.to_radians().sin()
@@ -358,7 +358,7 @@ pub fn ground_range(slant: f64, incidence: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// β as tabulated elsewhere for each orbit and incidence, to the digits printed; ALOS-2 alike for its modes.
+    /// β agrees with tabulated values of each orbit and incidence to the digits printed; the modes of ALOS-2 share one value.
     #[test]
     fn range_to_velocity_of_the_orbits() {
         let table = [
@@ -377,7 +377,7 @@ mod tests {
             let beta = mode.range_to_velocity_at(mode.incidence);
             assert!((beta - expected).abs() < rounding, "{sensor:?}: {beta}");
         }
-        // Straight down the range is the altitude; at the horizon the tangent.
+        // At nadir the range is the altitude; at the horizon it is the tangent.
         let speed = |h: f64| (EARTH_GRAVITY / (EARTH_RADIUS + h)).sqrt();
         let h = 7e5;
         assert!((range_to_velocity(h, 0.0) * speed(h) / h - 1.0).abs() < 1e-12);
@@ -386,7 +386,7 @@ mod tests {
         assert!((grazing * speed(h) / tangent - 1.0).abs() < 1e-12);
     }
 
-    /// Kilometres to the first ghost; of the first, 5 for its three sub-swaths together.
+    /// Distance of the first ambiguity in kilometres; for Sentinel-1 IW, 5 km for its three sub-swaths together.
     #[test]
     fn ambiguities_lie_where_tabulated() {
         for (sensor, expected, rounding) in [
@@ -415,16 +415,16 @@ mod tests {
         assert!((ground_range(first, 33.0) - 20.3).abs() < 0.06);
         let mode = Sensor::Sentinel1Iw.mode();
         assert!((mode.range_resolution_at(45.0) - 20.3).abs() < 1e-12);
-        // One slant resolution: 3 m at 32° is 4.71 m at 19.7°.
+        // With a constant slant resolution, 3 m at 32° is 4.716 m at 19.7°.
         let mode = Sensor::TerraSarXSm.mode();
         assert!((mode.range_resolution_at(32.0) - 3.0).abs() < 1e-12);
         assert!((mode.range_resolution_at(19.7) - 4.716).abs() < 1e-3);
-        // c/2B without a window, 0.886 of it.
+        // Without a window, 0.886 c/(2B).
         let slant = slant_resolution(100e6, Window::Uniform);
         assert!((slant - 0.885_892_9 * 1.498_962_29).abs() < 1e-6);
     }
 
-    /// Looks that the products state.
+    /// Equivalent numbers of looks that the products state.
     #[test]
     fn equivalent_looks_of_the_products() {
         for (sensor, low, high) in [

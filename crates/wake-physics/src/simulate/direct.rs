@@ -1,4 +1,4 @@
-//! The oracles of all stages at some pixels of an image that is too large for them as a whole.
+//! Slow reference methods of all stages at some pixels of an image that is too large for them as a whole.
 
 use super::record::{Clock, Seconds};
 use super::simulation::Method;
@@ -18,26 +18,27 @@ use crate::waves::{PlaneWaves, harmonic_sum};
 use crate::workspace::Workspace;
 use rayon::prelude::*;
 
-/// Some pixels of an image before speckle, by the oracles.
+/// Some pixels of an image before speckle, by the reference methods.
 #[derive(Debug, Clone)]
 pub struct DirectPixels {
-    /// Intensity, linear, in the unit of σ⁰, one value a pixel.
+    /// Intensity, linear, in units of σ⁰, one value per pixel.
     pub intensity: Vec<f64>,
-    /// Source pixels that reach them: the waves were summed and σ⁰ integrated at these.
+    /// Number of source pixels that reach them, at which the waves were summed and σ⁰ was integrated.
     pub sources: usize,
-    /// Seconds of the oracles alone: sea, wake and σ⁰ at the source pixels; imaging, over all sources, of the pixels.
+    /// Seconds of the reference methods alone: sea, wake and σ⁰ at the source pixels; imaging of the pixels from all
+    /// sources.
     pub seconds: Seconds,
 }
 
-/// The image before speckle at some pixels (row, column), by the methods of [`Method::Direct`].
+/// Image before speckle at some pixels (row, column), by the methods of [`Method::Direct`].
 ///
-/// Which sources reach a pixel is read off the fast fields, with room to spare; their values are not used. So the cost
-/// grows with waves × pixels asked for, not with waves × pixels of the image.
+/// The fast fields determine which sources reach a pixel, with a margin; their values are not used. The cost thus grows
+/// with waves × requested pixels, not with waves × pixels of the image.
 ///
 /// # Errors
 ///
-/// A value of the scene out of its range, a grid that does not fit in memory, a pixel outside the image, or an impulse
-/// response, of which no pixel can be had alone.
+/// If a value of the scene is out of range, the grid does not fit in memory, a pixel lies outside the image, or the scene
+/// has an impulse response, with which no pixel can be computed alone.
 pub fn direct_intensity(scene: &Scene, pixels: &[[usize; 2]]) -> Result<DirectPixels> {
     scene.validate()?;
     for pixel in pixels {
@@ -129,7 +130,7 @@ impl Stages<'_> {
         }
     }
 
-    /// The source pixels that reach the pixels, by the fast fields.
+    /// The source pixels that reach the given pixels, from the fast fields.
     fn reaching(&self, workspace: &mut Workspace, pixels: &[[usize; 2]]) -> Vec<[usize; 2]> {
         let mut sea = sea_of(&self.run, workspace);
         let mut fields = self.sea(workspace, &mut sea);
@@ -143,7 +144,7 @@ impl Stages<'_> {
         reaching(&imaging, &sources, &self.computed, pixels)
     }
 
-    /// Sea, waves of effects and wakes by harmonic sums at some pixels; 0 at all others.
+    /// Sea, waves of effects and wakes by harmonic sums at some pixels; 0 elsewhere.
     fn harmonic_fields(
         &self,
         workspace: &mut Workspace,
@@ -215,7 +216,7 @@ mod tests {
             .unwrap()
     }
 
-    /// A few pixels alone are those of the whole image by the oracles, of a plain scene and of one with all extras.
+    /// A few pixels alone equal those of the whole reference image, for a plain scene and one with all extras.
     #[test]
     fn pixels_are_those_of_the_direct_image() {
         let plain = ["ship.position=[60, 60]", "ship.echo=true"];
@@ -233,7 +234,7 @@ mod tests {
             let [rows, columns] = whole.plan.sizes.computed;
             assert!(alone.sources > 0 && alone.sources < rows * columns);
             for (&[i, j], value) in pixels.iter().zip(&alone.intensity) {
-                // The whole rounds sea, wake and intensity to f32 (6e-8 each): a source at most some 20 rows off is
+                // The whole image rounds sea, wake and intensity to f32 (6e-8 each): a source at most some 20 rows away is
                 // displaced by 4e-6 rows, which changes a weight near the middle by at most twice that.
                 let error = value / f64::from(whole.intensity.at(i, j)) - 1.0;
                 assert!(error.abs() < 1e-5, "[{i}, {j}] {error:e}");

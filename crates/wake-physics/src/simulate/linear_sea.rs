@@ -1,4 +1,4 @@
-//! The open sea as a radar sees it to first order: a Gaussian field with the spectrum of the image.
+//! Image of the open sea to first order: a Gaussian field with the spectrum of the image.
 
 use crate::dispersion::angular_frequency;
 use crate::error::Result;
@@ -16,13 +16,13 @@ use num_complex::Complex32;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// Pixels between opposite edges of an image, around the period of the field.
+/// Smallest number of pixels between opposite edges of an image, around the period of the field.
 pub(crate) const GUARD: usize = 64;
 
-/// Waves that the smear leaves less of their variance are not there.
+/// Waves with less than this share of their variance left after the smear are dropped.
 const LEAST_SHARE: f64 = 1e-6;
 
-/// The relative intensity (I − E I)/E I of open sea, linear in the waves.
+/// Relative intensity (I − E I)/E I of open sea, linear in the waves.
 ///
 /// ```text
 /// P(k) = (q |M(k)| T(kx) T(ky))² exp(−2 (ky ρ'/2π)²) Ψ(k)
@@ -30,11 +30,11 @@ const LEAST_SHARE: f64 = 1e-6;
 /// ```
 ///
 /// - Ψ: wind waves and swell
-/// - ρ' and the derivative of ln σ⁰ are those that the whole sea has
-/// - T: what an impulse response leaves of a wave of the mean intensity, 1 without one
-/// - q: share of the mean intensity that waves modulate; breaking waves and noise are the rest
+/// - ρ' and the derivative of ln σ⁰ are those of the whole sea
+/// - T: intensity transfer function of the impulse response, 1 without one
+/// - q: share of the mean intensity that waves modulate; the rest is breaking waves and noise
 ///
-/// This is the quasi-linear spectrum of the image, here even in k. The image itself is steeper and not Gaussian; gusts and
+/// This is the quasi-linear spectrum of the image, made even in k. The actual image is steeper and not Gaussian; gusts and
 /// slicks are in [`expected_intensity`](super::expected_intensity).
 ///
 /// # References
@@ -44,15 +44,15 @@ const LEAST_SHARE: f64 = 1e-6;
 pub struct LinearSea {
     rows: usize,
     columns: usize,
-    /// Pixels of a period along both axes.
+    /// Pixels per period along both axes.
     period: usize,
-    /// Root of the variance of each pair of waves ±k, by its one with kx ≥ 0: `[columns / 2 + 1, rows]` of the period, in the
-    /// order of [`crate::fft`].
+    /// Root of the variance of each pair of waves ±k, indexed by the one with kx ≥ 0: `[columns / 2 + 1, rows]` of the
+    /// period, in the order of [`crate::fft`].
     amplitudes: Vec<f32>,
 }
 
 impl LinearSea {
-    /// The sea of a scene, whether or not a ship is there; all zero without waves that a pixel carries.
+    /// The sea of a scene, ignoring ships; all zero if pixels resolve no waves.
     ///
     /// # Errors
     ///
@@ -65,7 +65,7 @@ impl LinearSea {
         };
         let [rows, columns] = [scene.grid.rows, scene.grid.columns];
         let period = fast_length(rows.max(columns) + GUARD);
-        // White numbers, waves, two fields.
+        // Random numbers, waves and two fields.
         let needed = 24 * (period * period) as u64;
         let advice = "lower grid.rows or grid.columns";
         memory::check([rows, columns], [0, 0], needed, advice)?;
@@ -119,17 +119,17 @@ impl LinearSea {
         })
     }
 
-    /// Independent standard normal numbers that [`field`](Self::field) is made of.
+    /// Number of independent standard normal numbers that [`field`](Self::field) needs.
     #[must_use]
     pub fn normals(&self) -> usize {
         2 * self.amplitudes.len()
     }
 
-    /// One sea, relative intensity \[1\], `[rows, columns]` of the image; its opposite edges are independent.
+    /// One random sea as relative intensity \[1\], `[rows, columns]` of the image; its opposite edges are independent.
     ///
     /// # Panics
     ///
-    /// If there are fewer numbers than [`normals`](Self::normals).
+    /// If there are fewer random numbers than [`normals`](Self::normals).
     #[must_use]
     pub fn field(&self, normals: &[f32]) -> Field {
         let pairs = normals[..self.normals()].as_chunks::<2>().0;
@@ -138,7 +138,7 @@ impl LinearSea {
         self.sum(waves, [self.rows, self.columns])
     }
 
-    /// Covariance \[1\] of two pixels by their distance in rows and columns, `[period, period]`, negative ones from the end.
+    /// Covariance \[1\] of two pixels by their distance in rows and columns, `[period, period]`, negative ones at the end.
     #[must_use]
     pub fn covariance(&self) -> Field {
         let waves = self.amplitudes.iter().map(|a| Complex32::new(a * a, 0.0));
@@ -152,11 +152,11 @@ impl LinearSea {
         squares.sum()
     }
 
-    /// The real part of a sum of waves with kx ≥ 0.
+    /// Real part of a sum of waves with kx ≥ 0.
     fn sum(&self, half: impl Iterator<Item = Complex32>, [rows, columns]: [usize; 2]) -> Field {
         let mut waves = Vec::with_capacity(self.period * self.period);
         waves.extend(half);
-        // The FFT passes over lines of nothing.
+        // The FFT skips empty lines.
         waves.resize(self.period * self.period, Complex32::default());
         let [values, _] = lattice_sum(&mut waves, [self.period; 2], [rows, columns]);
         Field {
@@ -167,7 +167,7 @@ impl LinearSea {
     }
 }
 
-/// Variances of the waves of a square lattice, those of k and −k together where kx > 0: the real parts of waves along both are alike.
+/// Variances of the waves of a square lattice, those of k and −k combined where kx > 0, as their real parts are equivalent.
 ///
 /// # Shapes
 ///
@@ -175,7 +175,7 @@ impl LinearSea {
 fn pairs(variances: &[f32], period: usize) -> impl Iterator<Item = f32> {
     (0..(period / 2 + 1) * period).map(move |n| {
         let [line, row] = [n / period, n % period];
-        // The first line, and the last one of an even period, hold both already.
+        // The first line, and the last line of an even period, contain both already.
         match 2 * line % period {
             0 => variances[n],
             _ => variances[n] + variances[(period - line) * period + (period - row) % period],
@@ -183,9 +183,10 @@ fn pairs(variances: &[f32], period: usize) -> impl Iterator<Item = f32> {
     })
 }
 
-/// Adds the waves of a swell to variances along +k, all of its variance however few of them are near its peak.
+/// Adds the waves of a swell to the variances along +k. The swell's whole variance is added, even if few waves lie near its
+/// peak.
 ///
-/// - `period` waves along each axis, `step` between them [rad/m]
+/// - `period` waves along each axis, spaced by `step` [rad/m]
 pub(crate) fn add_swell(swell: Option<&Swell>, variances: &mut [f32], period: usize, step: f64) {
     let Some(swell) = swell else {
         return;

@@ -1,4 +1,4 @@
-//! From a scene to a SAR image: `stages` alone knows the order of the stages.
+//! Simulation of a scene: the order of the stages is defined in `stages` alone.
 //!
 //! ```text
 //! Scene ─► Prepared { models, effects, open sea } ─► Plan ─► Stages ─► Simulation
@@ -30,12 +30,12 @@ use record::Clock;
 use speckling::Speckling;
 use stages::{Drawn, Memory, Run, draw};
 
-/// Simulates scene after scene with the memory, the FFT plans and the table of σ⁰ of the last.
+/// Simulates scenes one after another, reusing memory, FFT plans and the table of σ⁰.
 ///
-/// The first scene costs what [`simulate`] costs; later ones of its size fault no new pages, and those of the same radar
-/// and wind make no new table. No result depends on what was simulated before. A simulator keeps as many blocks as its
-/// largest scene needs at once, some 30 fields of the image; it is freed with it. One simulator serves one thread, and
-/// uses all threads of the pool itself.
+/// The first scene costs as much as [`simulate`]. Later scenes of the same size cause no new page faults, and those with
+/// the same radar and wind build no new table. No result depends on earlier simulations. A simulator keeps as many buffers
+/// as its largest scene needs at once, some 30 fields of the image, until it is dropped. One simulator serves one thread,
+/// and uses all threads of the pool itself.
 ///
 /// ```
 /// use wake_physics::{Scene, Simulator};
@@ -56,16 +56,16 @@ pub struct Simulator {
 }
 
 impl Simulator {
-    /// Simulates a scene: all fields, the image, labels.
+    /// Simulates a scene: all fields, the image and labels.
     ///
     /// # Errors
     ///
-    /// A value of the scene out of its range, or a grid that does not fit in memory.
+    /// If a value of the scene is out of range, or the grid does not fit in memory.
     pub fn simulate(&mut self, scene: &Scene) -> Result<Simulation> {
         self.simulate_with(scene, Method::Fast)
     }
 
-    /// [`Self::simulate`] by a method.
+    /// As [`Self::simulate`], by the given method.
     ///
     /// # Errors
     ///
@@ -121,7 +121,7 @@ impl Simulator {
         })
     }
 
-    /// The image of a scene and its labels: fields that the image does not need are not computed.
+    /// Computes only the image of a scene and its labels, without fields that the image does not need.
     ///
     /// # Errors
     ///
@@ -144,7 +144,7 @@ impl Simulator {
         })
     }
 
-    /// As [`expected_intensity`].
+    /// As [`expected_intensity`], reusing memory.
     ///
     /// # Errors
     ///
@@ -160,7 +160,7 @@ impl Simulator {
         Ok(self.image_of(&prepared, &plan).fields.intensity)
     }
 
-    /// The intensity before speckle, and no other field but what the impulse response looks at.
+    /// Intensity before speckle, with no other fields than the sources of the impulse response.
     fn image_of(&mut self, prepared: &Prepared<'_>, plan: &Plan) -> Drawn {
         let run = Run {
             prepared,
@@ -171,8 +171,7 @@ impl Simulator {
         draw(run, &mut self.memory, &mut Clock::start())
     }
 
-    /// Takes the blocks of a simulation back that is no longer needed: the next one of this size asks the system for
-    /// none.
+    /// Takes back the buffers of a simulation that is no longer needed, so that the next one of this size allocates none.
     pub fn reclaim(&mut self, mut simulation: Simulation) {
         for field in simulation.fields_mut() {
             self.memory.workspace.give(std::mem::take(field));
@@ -180,7 +179,7 @@ impl Simulator {
     }
 }
 
-/// Simulates a scene with the fast methods; for many scenes see [`Simulator`].
+/// Simulates a scene with the fast methods; for many scenes use [`Simulator`].
 ///
 /// # Errors
 ///
@@ -189,7 +188,7 @@ pub fn simulate(scene: &Scene) -> Result<Simulation> {
     Simulator::default().simulate(scene)
 }
 
-/// [`simulate`] by a method.
+/// As [`simulate`], by the given method.
 ///
 /// # Errors
 ///
@@ -198,21 +197,20 @@ pub fn simulate_with(scene: &Scene, method: Method) -> Result<Simulation> {
     Simulator::default().simulate_with(scene, method)
 }
 
-/// Mean over all seas of the intensity before speckle, in the unit of σ⁰, `[rows, columns]` of the image.
+/// Mean over all seas of the intensity before speckle, in units of σ⁰, `[rows, columns]` of the image.
 ///
-/// The wake is imaged as in [`simulate`], but every wave of the sea counts as one that a pixel does not
-/// resolve: its slopes are averaged over in σ⁰, and its velocity widens the response in azimuth,
+/// The wake is imaged as in [`simulate`], but every wave of the sea is treated as unresolved: its slopes are averaged over
+/// in σ⁰, and its velocity widens the response in azimuth,
 ///
 /// ```text
 /// E I = Σ E σ⁰ P(y − y' − (R/V) u; ρ'),     ρ'² = ρ² + 2π² (R/V)² var u_sea
 /// ```
 ///
-/// with u of the wake alone. This is the mean where the sea's velocity is Gaussian and independent of the σ⁰ of the
-/// same place, which a tilt and a velocity of different phase are to first order. Neglected: the sea's displacement in
-/// range, its defocus, and how it and the wake modulate each other.
+/// with u of the wake alone. This is the mean if the sea's velocity is Gaussian and independent of σ⁰ at the same place,
+/// which holds to first order for a tilt and a velocity of different phase. Neglected are the sea's displacement in range,
+/// its defocus, and the mutual modulation of sea and wake.
 ///
-/// Gusts, slicks and the points of a ship that echo are those that the scene's seed draws; without them the seed does not
-/// matter.
+/// Gusts, slicks and a ship's point scatterers are determined by the scene's seed; without them the seed does not matter.
 ///
 /// # Errors
 ///

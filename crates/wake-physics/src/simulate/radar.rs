@@ -1,4 +1,4 @@
-//! Stages of the radar: σ⁰, and the image before speckle.
+//! Radar stages: σ⁰, and the image before speckle.
 
 use super::record::{Accuracy, Reached};
 use super::simulation::Method;
@@ -14,7 +14,7 @@ use crate::scattering::{Backscatter, BackscatterTable, FacetFields};
 use crate::scene::Term;
 use crate::workspace::Workspace;
 
-/// Share of the expected mean σ⁰ for which the table is made at first: chosen, the mean that is there is rarely lower.
+/// Share of the expected mean σ⁰ for which the table is built first: chosen, as the actual mean is rarely lower.
 const LOWEST_MEAN: f64 = 0.8;
 
 impl Stages<'_> {
@@ -24,7 +24,7 @@ impl Stages<'_> {
         models.backscatter(self.uses(Term::TiltAverage), self.uses(Term::Specular))
     }
 
-    /// The facets at which σ⁰ is taken.
+    /// The facets at which σ⁰ is evaluated.
     pub(super) fn facets<'f>(
         &self,
         fields: &'f Fields,
@@ -39,7 +39,7 @@ impl Stages<'_> {
         }
     }
 
-    /// Computes σ⁰, with everything that changes it.
+    /// Computes σ⁰ with all effects that change it.
     pub(super) fn scatter(
         &self,
         memory: &mut Memory,
@@ -56,14 +56,14 @@ impl Stages<'_> {
         fields.sigma0 = sigma0;
     }
 
-    /// Applies what optional effects do to σ⁰.
+    /// Applies the changes of σ⁰ by optional effects.
     pub(super) fn change_sigma0(&self, sigma0: &mut Field, roughening: &Roughening) {
         for effect in self.effects() {
             effect.change_sigma0(&self.site, sigma0, roughening.bragg_remaining.as_ref());
         }
     }
 
-    /// σ⁰ by a table.
+    /// Computes σ⁰ by a table.
     fn tabulated(
         &self,
         memory: &mut Memory,
@@ -79,10 +79,10 @@ impl Stages<'_> {
         let expected = LOWEST_MEAN * self.run.plan.mean_sigma0;
         let mut table = table_for(memory.table.take(), expected);
         table.fill_sigma0(&mut sigma0, facets);
-        // The mean is known now; without a sea near nadir it is far from the one that was expected.
+        // Now the mean is available; without a sea near nadir it differs widely from the expected one.
         let mean = sigma0.mean();
         if mean > 0.0 && table.error() > asked * mean {
-            // One table in memory, not two.
+            // Frees the old table first, to hold only one in memory.
             drop(table);
             table = table_for(None, mean);
             table.fill_sigma0(&mut sigma0, facets);
@@ -95,7 +95,7 @@ impl Stages<'_> {
         sigma0
     }
 
-    /// What the radar does.
+    /// Imaging parameters of the radar.
     pub(super) fn imaging(&self) -> Imaging {
         let models = self.site.models;
         Imaging {
@@ -109,7 +109,7 @@ impl Stages<'_> {
         }
     }
 
-    /// What the radar looks at.
+    /// Fields to be imaged.
     pub(super) fn sources<'f>(&self, fields: &'f Fields) -> Sources<'f> {
         let uses = |term| self.uses(term);
         Sources {
@@ -133,7 +133,7 @@ impl Stages<'_> {
         fields.intensity = intensity;
     }
 
-    /// Adds the ships' own echoes, their points only where no impulse response is to image these, and the radar's noise.
+    /// Adds the ships' echoes (their points only if no impulse response images them) and the radar's noise.
     pub(super) fn add_echo_and_noise(&self, intensity: &mut Field) {
         let models = self.site.models;
         if models.response.is_none() {
@@ -157,8 +157,8 @@ mod tests {
     use crate::scene::Scene;
     use crate::simulate::simulate;
 
-    /// Otherwise every table of σ⁰ is made twice, and none can be used again. The upper limit is the mean's two digits,
-    /// and the part of the image that a strong wake darkens.
+    /// Otherwise every table of σ⁰ would be built twice, and none reused. The upper limit allows for the two-digit accuracy
+    /// of the mean and for the part of the image that a strong wake darkens.
     #[test]
     fn the_expected_mean_is_that_of_the_image() {
         for changes in [

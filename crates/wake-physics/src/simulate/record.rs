@@ -1,4 +1,4 @@
-//! What a run took and reached: seconds by stage, and the accuracy of the numerical methods.
+//! Record of a run: seconds by stage, and the accuracy of the numerical methods.
 
 use serde::Serialize;
 use std::time::Instant;
@@ -15,7 +15,7 @@ pub struct Seconds {
     pub imaging: f64,
     pub speckle: f64,
     pub labels: f64,
-    /// All of it, without writing files.
+    /// Total, without writing files.
     pub total: f64,
 }
 
@@ -38,7 +38,7 @@ impl std::fmt::Display for Seconds {
     }
 }
 
-/// Laps since a start, gathered by stage.
+/// Stopwatch that adds up the time of each stage.
 pub(super) struct Clock {
     start: Instant,
     lap: Instant,
@@ -62,50 +62,50 @@ impl Clock {
         self.lap = now;
     }
 
-    /// Leaves the time since the last lap out.
+    /// Discards the time since the last lap.
     pub(super) fn skip(&mut self) {
         self.lap = Instant::now();
     }
 
-    /// Seconds by stage, and since the start.
+    /// Returns the seconds by stage, and in total since the start.
     pub(super) fn stop(mut self) -> Seconds {
         self.seconds.total = self.start.elapsed().as_secs_f64();
         self.seconds
     }
 }
 
-/// An error asked for, and the one reached by the method's own bound or estimate.
+/// A demanded error, and the error reached by the method's own bound or estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Reached {
-    /// Largest error asked for.
+    /// Largest error demanded.
     pub asked: f64,
     /// Error stated by the method.
     pub reached: f64,
 }
 
 impl Reached {
-    /// Whether the method is as exact as it was asked to be.
+    /// Whether the method is as accurate as demanded.
     #[must_use]
     pub fn met(&self) -> bool {
         self.reached <= self.asked
     }
 }
 
-/// Errors of the numerical methods; absent for fields that were not computed, or computed directly.
+/// Errors of the numerical methods; absent for fields that were not computed or were computed directly.
 ///
-/// The kernels of the imaging always keep their share of the tolerance, and FFTs their rounding.
+/// The kernels of the imaging always keep their share of the tolerance; FFTs err by rounding.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Accuracy {
-    /// Sum of the waves of the wake: bound on the largest error of a field, relative to the field's root mean square.
+    /// Sum of the wake's waves: bound on the largest error of a field, relative to the field's root mean square.
     pub wake: Option<Reached>,
     /// Table of σ⁰: estimate of its largest error, relative to the mean σ⁰.
     pub table: Option<Reached>,
-    /// Nodes of the table along the two principal axes of the unresolved slopes; 0 where there is none.
+    /// Nodes of the table along the two principal axes of the unresolved slopes; 0 without a table.
     pub table_nodes: [usize; 2],
 }
 
 impl Accuracy {
-    /// What two parts of a scene reached together: the worse of both.
+    /// Combined accuracy of two parts of a scene: the worse of both.
     pub(super) fn and(&self, other: &Self) -> Self {
         let worse = |a: Option<Reached>, b: Option<Reached>| match (a, b) {
             (Some(a), Some(b)) if b.reached <= a.reached => Some(a),
@@ -120,7 +120,7 @@ impl Accuracy {
         }
     }
 
-    /// One sentence for every method that missed what it was asked for.
+    /// One sentence for every method that missed the demanded error.
     #[must_use]
     pub fn missed(&self) -> Vec<String> {
         [
@@ -157,7 +157,7 @@ mod tests {
             missed.len() == 1 && missed[0].contains("2.0e-3"),
             "{missed:?}"
         );
-        // What is not a number is not met.
+        // NaN counts as missed.
         assert_eq!(accuracy(f64::NAN).missed().len(), 1);
     }
 }

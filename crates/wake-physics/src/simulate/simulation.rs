@@ -1,4 +1,4 @@
-//! What comes out of a simulation, and how it is written.
+//! Results of a simulation, and their output files.
 
 use super::record::{Accuracy, Seconds};
 use super::speckling::Speckling;
@@ -18,21 +18,21 @@ use serde_json::{Value, json};
 #[cfg(feature = "png")]
 use std::path::Path;
 
-/// Method by which fields are computed.
+/// Methods to compute the fields.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// FFT, non-uniform FFT, table, scattered kernels.
     Fast,
-    /// The oracles: harmonic sums over the same waves, σ⁰ by quadrature at each pixel, the dense bunching
-    /// integral. Cost grows with waves × pixels.
+    /// Slow references: harmonic sums over the same waves, σ⁰ by quadrature at each pixel, the dense bunching integral. The
+    /// cost grows with waves × pixels.
     Direct,
 }
 
-/// Everything a simulation makes. Fields are `[rows, columns]` of the image.
+/// Complete result of a simulation. Fields are `[rows, columns]` of the image.
 #[derive(Debug, Clone)]
 pub struct Simulation {
-    /// Places of the pixels.
+    /// Positions of the pixels.
     pub raster: Raster,
     /// Elevation ζ \[m\].
     pub elevation: Field,
@@ -44,17 +44,17 @@ pub struct Simulation {
     pub velocity_x: Field,
     /// Velocity of the water along y [m/s].
     pub velocity_y: Field,
-    /// Velocity of the water upward [m/s].
+    /// Upward velocity of the water [m/s].
     pub velocity_z: Field,
     /// Velocity toward the radar [m/s].
     pub radial_velocity: Field,
     /// Cross-section σ⁰ per unit area, linear.
     pub sigma0: Field,
-    /// Image intensity before speckle, linear, in the unit of σ⁰.
+    /// Image intensity before speckle, linear, in units of σ⁰.
     pub intensity: Field,
     /// Image intensity with speckle.
     pub speckled: Field,
-    /// Single-look complex image, `[rows, columns]` of the image, where it has an impulse response and one look: its
+    /// Single-look complex image, `[rows, columns]` of the image, if the scene has an impulse response and one look; its
     /// squared modulus is [`Self::speckled`].
     pub slc: Option<Vec<Complex32>>,
     /// Labels of ships and wakes.
@@ -71,11 +71,10 @@ pub struct Simulation {
     pub scene: Scene,
 }
 
-/// The image of a scene, without the fields it was made from.
+/// The image of a scene, without the underlying fields.
 #[derive(Debug, Clone)]
 pub struct SarImage {
-    /// Intensity before speckle, linear, in the unit of σ⁰, `[rows, columns]`: the same bits as
-    /// [`Simulation::intensity`].
+    /// Intensity before speckle, linear, in units of σ⁰, `[rows, columns]`; bit-identical to [`Simulation::intensity`].
     pub intensity: Field,
     /// Labels of ships and wakes.
     pub labels: Labels,
@@ -87,7 +86,7 @@ pub struct SarImage {
 }
 
 impl SarImage {
-    /// Intensity with speckle, if the plan has it: the same bits as [`Simulation::speckled`].
+    /// Intensity with speckle, if the plan has it; bit-identical to [`Simulation::speckled`].
     #[must_use]
     pub fn speckled(mut self) -> Field {
         self.speckling.apply(&mut self.intensity);
@@ -96,7 +95,7 @@ impl SarImage {
 }
 
 impl Simulation {
-    /// The fields by their names in `fields.safetensors`.
+    /// The fields with their names in `fields.safetensors`.
     #[must_use]
     pub fn named_fields(&self) -> [(&'static str, &Field); 10] {
         [
@@ -128,34 +127,34 @@ impl Simulation {
         ]
     }
 
-    /// Writes `image.png`, `fields.safetensors`, `labels.json` and `report.json` into a folder, each whole or
-    /// not at all, and returns the report.
+    /// Writes `image.png`, `fields.safetensors`, `labels.json` and `report.json` into a folder, each atomically, and
+    /// returns the report.
     ///
     /// # Errors
     ///
-    /// [`Error::File`](crate::Error::File) if the folder cannot be made or a file not be written.
+    /// [`Error::File`](crate::Error::File) if the folder or a file cannot be written.
     #[cfg(feature = "png")]
     pub fn write(&self, folder: &Path) -> Result<Value> {
         self.write_in(folder, &GreyScale::default())
     }
 
-    /// The amplitude scale of a quick-look: fixed by the σ⁰ that the scene has on average, not by its pixels.
+    /// The amplitude scale of a quick-look, fixed by the scene's expected mean σ⁰, not by its pixels.
     #[must_use]
     pub fn quick_look(&self) -> GreyScale {
         let noise = self.scene.radar.nesz;
         let noise = noise.map_or(0.0, |db| 10f64.powf(0.1 * db));
-        // A sea that returns nothing is black on any scale.
+        // A sea without any return is black on any scale.
         GreyScale::amplitude_around((self.plan.mean_sigma0 + noise).max(1e-5))
     }
 
-    /// The image with speckle in levels of 8 bits, `[rows, columns]`: the pixels of `image.png`.
+    /// The image with speckle in 8-bit levels, `[rows, columns]`: the pixels of `image.png`.
     #[must_use]
     pub fn levels(&self, grey: &GreyScale) -> Vec<u8> {
         let level = |&power: &f32| grey.level(f64::from(power));
         self.speckled.values.iter().map(level).collect()
     }
 
-    /// Writes the image with speckle alone, as an 8-bit grey PNG.
+    /// Writes only the image with speckle, as an 8-bit grey PNG.
     ///
     /// # Errors
     ///
@@ -166,7 +165,7 @@ impl Simulation {
         output::write_png(path, &self.levels(grey), rows, columns)
     }
 
-    /// [`Self::write`] with the picture in another grey.
+    /// As [`Self::write`], with the picture in the given grey scale.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! From the mean intensity to the image with speckle.
+//! Speckle of an image, from its mean intensity.
 
 use crate::constants::SPEED_OF_LIGHT;
 use crate::error::Result;
@@ -18,22 +18,22 @@ use crate::scene::{Scene, Ship};
 use num_complex::Complex32;
 use std::f64::consts::TAU;
 
-/// What the radar looks at before its impulse response.
+/// Sources of the impulse response.
 #[derive(Debug, Clone)]
 pub(super) struct Exposure {
     response: ImpulseResponse,
-    /// Places of the sources.
+    /// Pixels of the sources.
     sources: Raster,
-    /// Their intensity, noise included.
+    /// Intensity of the sources, noise included.
     pub(super) intensity: Field,
-    /// Ships and their ghosts.
+    /// Points of ships and their ambiguities.
     points: Vec<PointTarget>,
     /// Pixels of the image.
     image: Raster,
 }
 
 impl Exposure {
-    /// The intensity of a scene, on the computed pixels, with its ship as points.
+    /// The intensity of a scene on the computed pixels, with its ships as points.
     pub(super) fn of(
         scene: &Scene,
         models: &Models,
@@ -63,7 +63,7 @@ impl Exposure {
     }
 }
 
-/// The ships whose echo is drawn as points, with their ghosts: the same whether or not an impulse response images them.
+/// Points of the ships with an echo, and their ambiguities: the same with and without an impulse response.
 pub(super) fn points(scene: &Scene, models: &Models) -> Vec<PointTarget> {
     let radar = &scene.radar;
     let mut points = Vec::new();
@@ -90,7 +90,7 @@ pub(super) fn points(scene: &Scene, models: &Models) -> Vec<PointTarget> {
     points
 }
 
-/// The halos of the ships whose echo is drawn.
+/// Halos of the ships with an echo.
 pub(super) fn halos(scene: &Scene, models: &Models) -> Vec<Halo> {
     let radar = &scene.radar;
     let range = radar.range_resolution.unwrap_or(scene.grid.spacing);
@@ -117,7 +117,7 @@ pub(super) fn halos(scene: &Scene, models: &Models) -> Vec<Halo> {
     echoes(scene, models).filter_map(of_ship).collect()
 }
 
-/// The ships whose echo is drawn, with their numbers.
+/// The ships with an echo, and their indices.
 fn echoes<'s>(
     scene: &'s Scene,
     models: &'s Models,
@@ -154,12 +154,12 @@ fn viewing(scene: &Scene, models: &Models) -> Viewing {
     }
 }
 
-/// The ratio of a level \[dB\].
+/// Power ratio of a level \[dB\].
 fn power_ratio(level: f64) -> f64 {
     10f64.powf(0.1 * level)
 }
 
-/// Those points that lie among the sources: an impulse response would bring others around.
+/// The points inside the sources; an impulse response would wrap others around.
 fn points_inside(scene: &Scene, models: &Models) -> Vec<PointTarget> {
     let [rows, columns] = [
         models.pixels.computed.rows as f64,
@@ -176,25 +176,25 @@ fn points_inside(scene: &Scene, models: &Models) -> Vec<PointTarget> {
     points
 }
 
-/// How the image gets its speckle.
+/// Method of applying speckle to an image.
 #[derive(Debug, Clone)]
 pub(super) enum Speckling {
-    /// It has none.
+    /// No speckle.
     Without,
-    /// Each pixel by itself: looks, seed.
+    /// Independent speckle per pixel: looks, seed.
     Pixels(u32, u64),
-    /// Through the impulse response.
+    /// Speckle through the impulse response.
     Looks(Box<Exposure>, Looks),
 }
 
 impl Speckling {
-    /// What a scene asks for; `exposure` where its image has an impulse response.
+    /// The method for a scene; `exposure` is given if the image has an impulse response.
     pub(super) fn of(scene: &Scene, models: &Models, exposure: Option<Exposure>) -> Self {
         let (count, seed) = (scene.radar.looks, scene.seed);
         match (exposure, models.response) {
             (Some(exposure), Some(response)) => {
                 let overlap = scene.radar.look_overlap.unwrap_or(0.0);
-                // The looks of the products modelled lie in range; elsewhere the windows are alike.
+                // The looks of the modelled products are separated in range; otherwise the windows are alike.
                 let equivalent = response.range.window.overlapping_looks(count, overlap);
                 Self::Looks(Box::new(exposure), Looks { equivalent, seed })
             }
@@ -202,7 +202,7 @@ impl Speckling {
         }
     }
 
-    /// Gives an intensity its speckle, and returns the complex image where there is one look of one.
+    /// Applies speckle to an intensity; returns the complex image if there is an impulse response and a single look.
     pub(super) fn apply(&self, intensity: &mut Field) -> Option<Vec<Complex32>> {
         match self {
             Self::Without => None,
@@ -228,7 +228,7 @@ impl Speckling {
         }
     }
 
-    /// The block of the sources' intensity, where there is one.
+    /// Returns the buffer of the sources' intensity, if there is one.
     pub(super) fn into_sources(self) -> Option<Field> {
         match self {
             Self::Looks(exposure, _) => Some(exposure.intensity),
@@ -237,8 +237,8 @@ impl Speckling {
     }
 }
 
-/// Speckle of mean 1 as a scene's radar makes it on a sea that is the same everywhere, `[rows, columns]` of the image: correlated
-/// where the image has an impulse response.
+/// Speckle with mean 1 as a scene's radar makes it on a uniform sea, `[rows, columns]` of the image; correlated if the
+/// image has an impulse response.
 ///
 /// # Errors
 ///

@@ -1,4 +1,4 @@
-//! The order of the stages up to the intensity before speckle, and the stages of the surface; those of the radar stand in
+//! Order of the stages up to the intensity before speckle, and the stages of the surface; the radar's stages are in
 //! `radar`.
 
 use super::record::{Accuracy, Clock, Reached};
@@ -20,7 +20,7 @@ use crate::waves::{PlaneWaves, Quantity, harmonic_fields};
 use crate::workspace::Workspace;
 use rayon::prelude::*;
 
-/// One simulation: a prepared scene, its plan, the method, and the fields asked for.
+/// One simulation: a prepared scene, its plan, the method, and the wanted fields.
 #[derive(Clone, Copy)]
 pub(super) struct Run<'a> {
     pub(super) prepared: &'a Prepared<'a>,
@@ -29,30 +29,30 @@ pub(super) struct Run<'a> {
     pub(super) wanted: Wanted,
 }
 
-/// A scene being drawn: what its stages have in common.
+/// State shared by the stages of a scene.
 pub(super) struct Stages<'a> {
     pub(super) run: Run<'a>,
-    /// The rows that are drawn at once.
+    /// The rows computed at once.
     pub(super) site: Site<'a>,
-    /// Whether no strip comes after this one.
+    /// Whether this is the last strip.
     last: bool,
     /// The computed pixels of the image, without margin.
     pub(super) computed: Raster,
-    /// What the image needs, and what is wanted besides. Each group is summed by itself, so that the image has the
-    /// same bits with and without the second.
+    /// Fields that the image needs, and others that are wanted. Each group is summed separately, so that the image is
+    /// bit-identical with and without the second.
     pub(super) quantities: [Vec<Quantity>; 2],
 }
 
-/// Fields of the surface that σ⁰ depends on besides slopes and modulation.
+/// Fields of the surface on which σ⁰ depends besides slopes and modulation.
 #[derive(Default)]
 pub(super) struct Roughening {
     /// Share of the Bragg waves that remains.
     pub(super) bragg_remaining: Option<Field>,
-    /// Slopes of ships' waves below the pixels.
+    /// Slope variances of ship waves too short for the pixels.
     pub(super) subpixel_variances: Option<[Field; 3]>,
 }
 
-/// Blocks and tables that one simulation leaves to the next.
+/// Buffers and tables that one simulation leaves to the next.
 #[derive(Debug, Default)]
 pub(super) struct Memory {
     pub(super) workspace: Workspace,
@@ -60,7 +60,7 @@ pub(super) struct Memory {
     pub(super) table: Option<BackscatterTable>,
 }
 
-/// The waves of the sea, drawn as a whole for all strips; `None` without a sea, and after the last strip.
+/// The waves of the sea, drawn once for all strips; `None` without a sea, and after the last strip.
 pub(super) type Sea = Option<Surface>;
 
 /// Draws the waves of a sea.
@@ -73,17 +73,17 @@ pub(super) fn sea_of(run: &Run<'_>, workspace: &mut Workspace) -> Sea {
     run.plan.uses(Term::Sea).then(draw)
 }
 
-/// A scene before speckle, at the pixels of the image.
+/// A scene before speckle, on the pixels of the image.
 #[derive(Default)]
 pub(super) struct Drawn {
-    /// All but the linear fields that only the image needs.
+    /// All fields except the linear fields that only the image needs.
     pub(super) fields: Fields,
     pub(super) accuracy: Accuracy,
-    /// Sources of the impulse response, where the image has one.
+    /// Sources of the impulse response, if the image has one.
     pub(super) exposure: Option<Exposure>,
 }
 
-/// All stages up to the intensity before speckle. The clock runs since the plan was made.
+/// Runs all stages up to the intensity before speckle. The clock has been running since the plan was made.
 pub(super) fn draw(run: Run<'_>, memory: &mut Memory, clock: &mut Clock) -> Drawn {
     let models = &run.prepared.models;
     let mut sea = sea_of(&run, &mut memory.workspace);
@@ -147,13 +147,13 @@ impl<'a> Stages<'a> {
         self.run.plan.uses(term)
     }
 
-    /// The optional effects that are drawn.
+    /// The optional effects in use.
     pub(super) fn effects(&self) -> impl Iterator<Item = &dyn Effect> {
         let all = self.run.prepared.effects.each();
         all.filter(|effect| self.uses(effect.term()))
     }
 
-    /// All stages up to the intensity before speckle, in their order; the clock runs since the plan was made.
+    /// Runs all stages up to the intensity before speckle in order; the clock has been running since the plan was made.
     pub(super) fn draw(
         &self,
         memory: &mut Memory,
@@ -181,7 +181,7 @@ impl<'a> Stages<'a> {
         (fields, accuracy)
     }
 
-    /// Once all waves are in: currents, factors on the Bragg return, and what roughens or smooths the surface.
+    /// Applied after all waves are added: currents, factors on the Bragg return, roughening and smoothing of the surface.
     pub(super) fn finish_surface(
         &self,
         workspace: &mut Workspace,
@@ -211,18 +211,18 @@ impl<'a> Stages<'a> {
         roughening
     }
 
-    /// Tolerance of sums of waves; single precision is not more exact.
+    /// Tolerance for sums of waves, limited by single precision.
     fn field_tolerance(&self) -> f64 {
         (SHARES.fields * self.site.scene.model.tolerance).max(1e-6)
     }
 
-    /// The same of each wake, so that all keep it together.
+    /// Tolerance for each wake, so that all wakes together keep it.
     fn wake_tolerance(&self) -> f64 {
         let share = SHARES.fields / self.site.models.wakes.len().max(1) as f64;
         (share * self.site.scene.model.tolerance).max(1e-6)
     }
 
-    /// The waves of the sea; the last strip puts their blocks back.
+    /// Fields of the sea; the last strip returns the buffers of its waves.
     pub(super) fn sea(&self, workspace: &mut Workspace, sea: &mut Sea) -> Fields {
         let mut fields = Fields::default();
         let (raster, transfer) = (&self.site.raster, &self.site.models.transfer);
@@ -314,7 +314,7 @@ impl<'a> Stages<'a> {
         reached.map(|reached| Reached { asked, reached })
     }
 
-    /// Sums waves by the method, hands each field on, and returns the error that the method states.
+    /// Sums waves by the method in use, passes each field on, and returns the error stated by the method.
     fn sum(
         &self,
         workspace: &mut Workspace,

@@ -1,9 +1,10 @@
-//! A large scene in strips of rows: one after the other, so that only the image is in memory as a whole.
+//! Computation of a large scene in strips of rows, one after the other, so that only the image is held in memory as a
+//! whole.
 //!
-//! Places decide, not strips: all strips see the same waves of the sea, drawn once on one lattice, and the same nodes of the
-//! wake. What differs is the rounding of sums that depend on what else is summed (FFTs of the wake's gridding, the table of
-//! σ⁰), which stays within the shares of the tolerance that these have. Rows are computed beyond a strip as far as echoes are
-//! displaced, twice the margin of the image.
+//! Results depend on position, not on strips: all strips use the same waves of the sea, drawn once on one lattice, and the
+//! same nodes of the wake. They differ by the rounding of sums that depend on what else is summed (FFTs of the wake's
+//! gridding, the table of σ⁰), within the corresponding shares of the tolerance. Rows are computed beyond a strip as far as
+//! echoes are displaced, twice the margin of the image.
 
 use crate::pixels::{Parts, Pixels, means_over};
 use crate::plan::Sizes;
@@ -11,7 +12,7 @@ use crate::raster::{Field, Raster};
 use crate::workspace::Workspace;
 use std::ops::Range;
 
-/// Margins between a strip's image and the edge of what is computed for it.
+/// Margins between a strip's image and the edge of the rows computed for it.
 const OVERLAP: usize = 2;
 
 /// One strip.
@@ -19,16 +20,16 @@ const OVERLAP: usize = 2;
 pub(super) struct Strip {
     /// Rows of the image.
     pub(super) image: Range<usize>,
-    /// Rows of the computed image that they are made of; the last may be the first of the next strip as well.
+    /// Rows of the computed image from which they are made; the last may also be the first of the next strip.
     pub(super) computed: Range<usize>,
-    /// Those of them that belong to no other strip.
+    /// Computed rows that belong to no other strip.
     pub(super) own: Range<usize>,
     /// Rows of the computed pixels with their margin.
     pub(super) raster: Range<usize>,
 }
 
 impl Strip {
-    /// All rows.
+    /// A single strip with all rows.
     pub(super) fn whole(pixels: &Pixels, sizes: &Sizes) -> Self {
         Self {
             image: 0..pixels.image.rows,
@@ -48,7 +49,7 @@ impl Strip {
             let [start, end] = [n, n + 1].map(|n| n * whole.image.end / count);
             let mut own = parts.rows(&(start..end)).start..parts.rows(&(end..end + 1)).start;
             let mut computed = parts.rows(&(start..end));
-            // Around the rows of the strip lie margin rows, then the overlap.
+            // Around the rows of the strip lie the margin rows, then the overlap.
             let mut raster = computed.start.saturating_sub((OVERLAP - 1) * margin)
                 ..(computed.end + (OVERLAP + 1) * margin).min(whole.raster.end);
             if n == 0 {
@@ -69,7 +70,7 @@ impl Strip {
     }
 }
 
-/// The means of a field over the pixels of an image.
+/// Means of a field over the pixels of an image.
 pub(super) fn means(
     workspace: &mut Workspace,
     field: Field,
@@ -92,7 +93,7 @@ pub(super) fn means(
     means
 }
 
-/// Puts some rows of all into a field; what covers all of it becomes it. Rows after those that are put are dropped.
+/// Copies the first rows of a part into their place in a field of all rows, or moves the part if it covers all rows.
 pub(super) fn put(
     workspace: &mut Workspace,
     into: &mut Field,
@@ -127,7 +128,7 @@ mod tests {
     use crate::simulate::simulation::Method;
     use crate::simulate::stages::{Drawn, Memory, Run, draw};
 
-    /// Small margins: what lies beyond a strip is little.
+    /// Small margins, so that little lies beyond a strip.
     fn scene(keys: &[&str]) -> Scene {
         let base = [
             "grid.rows=170",
@@ -167,11 +168,11 @@ mod tests {
             "radar.range_to_velocity=20",
             "sea.gust_strength=0.1",
         ],
-        // Refined: rows of one strip are half of the next as well.
+        // Refined: rows of one strip are also half of the next.
         &["grid.spacing=10", "ship.speed=6.5", "ship.edge=true"],
     ];
 
-    /// Strips make the same image: all fields, rounding and the methods' own errors apart.
+    /// Strips give the same image in all fields, apart from rounding and the methods' own errors.
     #[test]
     fn strips_make_the_image_that_one_piece_makes() {
         for keys in SCENES {
@@ -182,8 +183,8 @@ mod tests {
                 let (mut parts, strips) = drawn(&scene, count);
                 assert_eq!(strips.len(), count);
                 let tolerance = scene.model.tolerance;
-                // Each sum of the wake's waves keeps its share of the root mean square over its own pixels, which in one
-                // of n strips is at most √n times that over all.
+                // Each sum of the wake's waves keeps its share of the root mean square over its own pixels, which in one of
+                // n strips is at most √n times that over all pixels.
                 let sums = (1.0 + (count as f64).sqrt()) * SHARES.fields * tolerance;
                 for (a, b) in whole
                     .fields
@@ -207,7 +208,7 @@ mod tests {
         }
     }
 
-    /// The sea itself is the same to the last bit, also where the margin of a strip ends with the image's.
+    /// The sea itself is bit-identical, even where the margin of a strip ends with the image's.
     #[test]
     fn the_sea_does_not_know_the_strips() {
         for keys in SCENES {
@@ -247,7 +248,7 @@ mod tests {
                         strip.computed.start <= strip.own.start
                             && strip.computed.end >= strip.own.end
                     );
-                    // Rows of the margin count from the first one above the image.
+                    // Rows of the margin are counted from the first one above the image.
                     let above = (strip.computed.start + margin) - strip.raster.start;
                     let below = strip.raster.end - (strip.computed.end + margin);
                     assert!(above >= margin && below >= margin);

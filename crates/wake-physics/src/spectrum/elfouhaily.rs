@@ -1,18 +1,18 @@
-//! The unified spectrum of Elfouhaily et al. (1997): long gravity waves and the short waves a radar sees.
+//! Unified spectrum of Elfouhaily et al. (1997): long gravity waves, and the short waves that scatter.
 //!
-//! Public codes of this model differ. This one follows the author's own programme in: log10 in the peak
-//! enhancement, `α_p` = 0.006 √Ω, the factor `L_PM·J_p` on long and short waves alike, and a spreading that is even
-//! over the full circle. It follows the paper in the slope 1 of `α_m` below `c_m` (the programme has 0.9).
-//! The one variant offered is the drag law, see [`DragLaw`].
+//! Public codes of this model differ. This one follows the author's own program in using log10 in the peak enhancement,
+//! `α_p` = 0.006 √Ω, the factor `L_PM·J_p` on both long and short waves, and a spreading that is even over the full circle.
+//! It follows the paper in the slope 1 of `α_m` below `c_m` (the program has 0.9). The only variant is the drag law, see
+//! [`DragLaw`].
 
 use crate::constants::GRAVITY;
 use crate::numeric::GaussLegendre;
 use std::f64::consts::{LN_2, PI};
 
-/// Wavenumber of the slowest wave `k_m` [rad/m], as the paper rounds it.
+/// Wavenumber of the slowest wave `k_m` [rad/m], as rounded in the paper.
 pub const SLOWEST_WAVENUMBER: f64 = 370.0;
 
-/// Phase speed of the slowest wave `c_m` [m/s], as the paper rounds it.
+/// Phase speed of the slowest wave `c_m` [m/s], as rounded in the paper.
 pub const SLOWEST_SPEED: f64 = 0.23;
 
 /// Inverse wave age of a fully developed sea `Ω_c` \[1\].
@@ -21,16 +21,16 @@ pub const FULLY_DEVELOPED: f64 = 0.84;
 /// Dimensionless fetch at which a sea is developed, X₀ \[1\].
 const DEVELOPED_FETCH: f64 = 2.2e4;
 
-/// Largest inverse wave age for which the peak enhancement was fitted \[1\].
+/// Largest inverse wave age to which the peak enhancement was fitted \[1\].
 const YOUNGEST_SEA: f64 = 5.0;
 
 /// Drag law of the wind, C₁₀ = (u*/U₁₀)².
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum DragLaw {
-    /// C₁₀ = (0.8 + 0.065 U₁₀)·10⁻³ (Wu 1982): the choice of the author's programme.
+    /// C₁₀ = (0.8 + 0.065 U₁₀)·10⁻³ (Wu 1982), as in the author's program.
     #[default]
     Wu,
-    /// C₁₀ = 0.00144 at every wind: the widespread variant. It makes 3 m/s wind about 2 dB brighter at X band.
+    /// C₁₀ = 0.00144 at every wind, a widespread variant. It makes the sea at 3 m/s about 2 dB brighter at X band.
     Fixed,
 }
 
@@ -70,7 +70,7 @@ pub fn inverse_wave_age(wind_speed: f64, fetch: f64) -> f64 {
             .powf(-0.75)
 }
 
-/// The spectrum of one sea: wind and wave age, with everything that does not depend on k computed once.
+/// Spectrum of one sea, with precomputed constants for its wind and wave age.
 ///
 /// ```text
 /// B = B_l + B_h = k³ S(k),        Ψ = B/k⁴ · (1 + Δ cos 2(φ − φ_wind))/(2π)
@@ -83,9 +83,9 @@ pub fn inverse_wave_age(wind_speed: f64, fetch: f64) -> f64 {
 ///
 /// # Validity
 ///
-/// Deep water, Ω from 0.84 to 5. For younger seas γ keeps its value at Ω = 5. `α_m` turns negative for
-/// u* < `c_m`/e (wind below 2.7 m/s with the drag of Wu) and is then set to 0: only the tail of the long waves is left.
-/// Without wind every value is 0.
+/// Deep water, Ω from 0.84 to 5. For younger seas γ keeps its value at Ω = 5. `α_m` turns negative for u* < `c_m`/e (wind
+/// below 2.7 m/s with Wu's drag) and is then set to 0, leaving only the tail of the long waves. Without wind every value is
+/// 0.
 ///
 /// # References
 ///
@@ -104,7 +104,7 @@ pub struct Elfouhaily {
 }
 
 impl Elfouhaily {
-    /// The sea that a wind U₁₀ [m/s] makes over a fetch \[m\].
+    /// Sea raised by a wind U₁₀ [m/s] over a fetch \[m\].
     #[must_use]
     pub fn new(wind_speed: f64, fetch: f64) -> Self {
         Self::of_age(
@@ -114,7 +114,7 @@ impl Elfouhaily {
         )
     }
 
-    /// The sea of a wind U₁₀ [m/s] and an inverse wave age Ω \[1\], at least 0.84, under a drag law.
+    /// Sea of a wind U₁₀ [m/s] and an inverse wave age Ω \[1\], at least 0.84, under a drag law.
     #[must_use]
     pub fn of_age(wind_speed: f64, inverse_wave_age: f64, drag: DragLaw) -> Self {
         Self::under_gravity(wind_speed, inverse_wave_age, drag, GRAVITY)
@@ -155,13 +155,13 @@ impl Elfouhaily {
         self.peak_wavenumber
     }
 
-    /// Whether there is no wind, and no wave.
+    /// Whether there is no wind and hence no wave.
     #[inline(always)]
     pub(crate) fn is_flat(&self) -> bool {
         self.peak_wavenumber.is_infinite()
     }
 
-    /// Phase speed c [m/s] in the form of this model: deep water, with surface tension.
+    /// Phase speed c [m/s] in this model's form: deep water, with surface tension.
     #[must_use]
     #[inline(always)]
     pub fn phase_speed(&self, wavenumber: f64) -> f64 {
@@ -177,12 +177,12 @@ impl Elfouhaily {
         self.curvature_by(wavenumber, f64::exp)
     }
 
-    /// B(k) at k above 0, of a sea with wind, by an exponential function.
+    /// B(k) at k above 0 for a sea with wind, using the given exponential function.
     #[inline(always)]
     fn curvature_by(&self, k: f64, exp: impl Fn(f64) -> f64) -> f64 {
         let age = (k / self.peak_wavenumber).sqrt() - 1.0;
         let distance = age / self.peak_width;
-        // Nine widths from the peak Γ is below rounding; no exponential for the short waves of a radar.
+        // At nine widths from the peak Γ is below rounding, which saves the exponential for the radar's short waves.
         let peak = if distance < 9.0 {
             exp(-0.5 * distance * distance)
         } else {
@@ -207,7 +207,7 @@ impl Elfouhaily {
         }
     }
 
-    /// Anisotropy Δ(k) \[1\]: how many more waves run along the wind than across it.
+    /// Anisotropy Δ(k) \[1\]: excess of waves along the wind over waves across it.
     ///
     /// ```text
     /// D(k, φ) = (1 + Δ cos 2φ)/(2π),   Δ = tanh[ln2/4 + 4 (c/c_p)^2.5 + 0.13 (u*/c_m)(c_m/c)^2.5]
@@ -217,7 +217,7 @@ impl Elfouhaily {
         self.anisotropy_by(wavenumber, f64::exp)
     }
 
-    /// Δ(k) by an exponential function.
+    /// Δ(k) using the given exponential function.
     #[inline(always)]
     fn anisotropy_by(&self, wavenumber: f64, exp: impl Fn(f64) -> f64) -> f64 {
         let c = self.phase_speed(wavenumber);
@@ -225,7 +225,7 @@ impl Elfouhaily {
         let long = 4.0 * to_two_and_half(c / self.peak_speed);
         let wind = 0.13 * self.friction_velocity / SLOWEST_SPEED;
         let x = LN_2 / 4.0 + long + wind * to_two_and_half(SLOWEST_SPEED / c);
-        // tanh x, by one exponential: x is far enough from 0 that nothing is lost.
+        // tanh x by one exponential; x is far enough from 0 to avoid cancellation.
         2.0 / (1.0 + exp(-2.0 * x)) - 1.0
     }
 
@@ -240,7 +240,7 @@ impl Elfouhaily {
         self.density_by(k, wind, f64::exp)
     }
 
-    /// Ψ(kx, ky) of a sea with wind, by an exponential function.
+    /// Ψ(kx, ky) for a sea with wind, using the given exponential function.
     #[inline(always)]
     pub(crate) fn density_by(
         &self,
@@ -254,7 +254,7 @@ impl Elfouhaily {
         let anisotropy = self.anisotropy_by(squared.sqrt(), exp);
         let spread = (1.0 + anisotropy * cos_twice) / (2.0 * PI);
         let curvature = self.curvature_by(squared.sqrt(), exp);
-        // Where there is no wave, as at k = 0, the rest may be no number.
+        // Where there is no wave, as at k = 0, the other factors may be NaN.
         if curvature > 0.0 {
             curvature / (squared * squared) * spread
         } else {
@@ -262,13 +262,13 @@ impl Elfouhaily {
         }
     }
 
-    /// Variance of the slopes along and across the wind of all waves from `low` to `high` \[1\].
+    /// Slope variances along and across the wind of all waves from `low` to `high` \[1\].
     ///
     /// ```text
     /// mss_up, mss_cross = ∫ k² S ½(1 ± Δ/2) dk = ∫ B ½(1 ± Δ/2) d ln k
     /// ```
     ///
-    /// - `low`, `high` wavenumbers [rad/m], from 0 to infinite; no waves if `high` ≤ `low`
+    /// - `low`, `high` wavenumbers [rad/m], from 0 to infinity; no waves if `high` ≤ `low`
     ///
     /// Gauss–Legendre panels no wider than ½ in ln k, which resolve the spectral peak to 1 part in 10⁶.
     #[must_use]
@@ -325,7 +325,7 @@ mod tests {
         );
     }
 
-    /// Six-digit values of our own second implementation, `tests/reference/sea_and_scattering.py`.
+    /// Six-digit values from the independent implementation `tests/reference/sea_and_scattering.py`.
     #[test]
     fn curvature_and_anisotropy_meet_the_reference() {
         let k = [1.0, 10.0, 100.0, 200.0, 370.0];
@@ -339,7 +339,7 @@ mod tests {
         }
     }
 
-    /// Wave height, peak and slope variances of the same; four digits, hence half a unit of the last.
+    /// Wave height, peak and slope variances from the same implementation; four digits, so half a unit of the last.
     #[test]
     fn moments_meet_the_reference() {
         let table = [
@@ -358,7 +358,7 @@ mod tests {
         }
     }
 
-    /// Hs = 4 √∫S dk by the trapezoid rule in ln k, 400 steps an octave.
+    /// Hs = 4 √∫S dk by the trapezoidal rule in ln k, with 400 steps per octave.
     fn significant_height(sea: &Elfouhaily) -> f64 {
         let step = LN_2 / 400.0;
         let sum: f64 = (-1600..16_000)
@@ -370,7 +370,7 @@ mod tests {
         4.0 * sum.sqrt()
     }
 
-    /// Growing seas, by the same.
+    /// Growing seas from the same implementation.
     #[test]
     fn a_fetch_makes_the_reference_seas() {
         let table = [
@@ -390,7 +390,7 @@ mod tests {
         close(inverse_wave_age(5.0, 1e9), FULLY_DEVELOPED, 1e-9);
     }
 
-    /// The documented variant: fixed drag raises the slopes at low wind.
+    /// The documented variant: a fixed drag raises the slopes at low wind.
     #[test]
     fn fixed_drag_meets_its_reference() {
         for (wind, mss) in [
@@ -452,7 +452,7 @@ mod tests {
         }
     }
 
-    /// Without wind nothing; below 2.7 m/s no short-wave part, but never a negative spectrum.
+    /// Zero without wind; below 2.7 m/s no short waves, but never a negative spectrum.
     #[test]
     fn low_winds_stay_finite() {
         for wind in [0.0, 1e-200, 1e-3, 0.5, 2.0, 2.7] {
@@ -469,7 +469,7 @@ mod tests {
         assert!(Elfouhaily::new(2.72, 4e4).short_level > 0.0);
     }
 
-    /// The shortest fetch and the strongest wind lie beyond Ω = 5 and give a finite spectrum.
+    /// The shortest fetch with the strongest wind lies beyond Ω = 5 and gives a finite spectrum.
     #[test]
     fn very_young_seas_stay_finite() {
         let sea = Elfouhaily::new(30.0, 100.0);

@@ -1,16 +1,16 @@
-//! The growing sea of JONSWAP (Hasselmann et al. 1973, 1976), led over to the developed sea.
+//! JONSWAP spectrum of a growing sea (Hasselmann et al. 1973, 1976), with a transition to the developed sea.
 
 use super::pierson_moskowitz::{LEVEL, PiersonMoskowitz};
 use crate::constants::GRAVITY;
 use std::f64::consts::TAU;
 
-/// Dimensionless fetch from which the sea is led over to full development \[1\]; chosen, see [`Jonswap`].
+/// Dimensionless fetch at which the transition to full development begins \[1\]; chosen, see [`Jonswap`].
 const MATURING_FETCH: f64 = 1.1e4;
 
 /// Mean peak enhancement γ of the growing sea \[1\].
 const ENHANCEMENT: f64 = 3.3;
 
-/// The spectrum of a sea that grows with the fetch.
+/// Spectrum of a sea that grows with the fetch.
 ///
 /// ```text
 /// S(ω) = α g² ω⁻⁵ exp[−(5/4)(ω_p/ω)⁴] γ^r      r = exp[−(ω − ω_p)²/(2σ²ω_p²)],  σ = 0.07 (ω ≤ ω_p), 0.09
@@ -20,16 +20,16 @@ const ENHANCEMENT: f64 = 3.3;
 ///
 /// # Validity
 ///
-/// The growth laws hold for growing seas. Beyond the fetch `ξ_d` ≈ 1.88·10⁴, where their peak reaches that of
-/// Pierson and Moskowitz, the spectrum *is* that of Pierson and Moskowitz. From ξ₁ = 1.1·10⁴ to `ξ_d`, `ω_p` follows
-/// its law while α and γ go to those of the developed sea (0.0081 and 1):
+/// The growth laws hold for growing seas. Beyond the fetch `ξ_d` ≈ 1.88·10⁴, where their peak reaches that of Pierson and
+/// Moskowitz, the Pierson–Moskowitz spectrum is used. From ξ₁ = 1.1·10⁴ to `ξ_d`, `ω_p` follows its law while α and γ tend
+/// to those of the developed sea (0.0081 and 1):
 ///
 /// ```text
 /// ln α = (1 − m) ln α(ξ₁) + m ln 0.0081     ln γ = (1 − m^1.25) ln 3.3     m = ln(ξ/ξ₁)/ln(ξ_d/ξ₁)
 /// ```
 ///
-/// so that the spectrum is continuous in the fetch and the wave height never falls with it. ξ₁ and the power are
-/// chosen: with a later start the height would fall, with an earlier one growing seas would lose their peak.
+/// The spectrum is thus continuous in the fetch, and the wave height never decreases with it. ξ₁ and the exponent are
+/// chosen: with a later start the height would decrease, with an earlier one growing seas would lose their peak.
 ///
 /// # References
 ///
@@ -42,7 +42,7 @@ pub struct Jonswap {
 }
 
 impl Jonswap {
-    /// The sea that a wind U₁₀ [m/s] makes over a fetch F \[m\], at most the developed sea.
+    /// Sea raised by a wind U₁₀ [m/s] over a fetch F \[m\], limited to the developed sea.
     #[must_use]
     pub fn new(wind_speed: f64, fetch: f64) -> Self {
         let developed = PiersonMoskowitz::new(wind_speed).peak_frequency();
@@ -63,7 +63,7 @@ impl Jonswap {
         )
     }
 
-    /// The spectrum of given level α \[1\], peak frequency `ω_p` [rad/s] and peak enhancement γ \[1\].
+    /// Spectrum with given level α \[1\], peak frequency `ω_p` [rad/s] and peak enhancement γ \[1\].
     #[must_use]
     pub fn with(level: f64, peak_frequency: f64, enhancement: f64) -> Self {
         Self {
@@ -107,7 +107,7 @@ impl Jonswap {
 mod tests {
     use super::*;
 
-    /// ∫S dω by the midpoint rule in ln ω, 1000 steps an e-fold.
+    /// ∫S dω by the midpoint rule in ln ω, with 1000 steps per e-fold.
     fn variance(model: &Jonswap) -> f64 {
         let step = 1e-3;
         (-1600..7000)
@@ -128,8 +128,8 @@ mod tests {
         }
     }
 
-    /// Height, peak period and level of growing seas against `tests/reference/sea_and_scattering.py`, our own second
-    /// implementation: one unit of the last digit.
+    /// Height, peak period and level of growing seas against the independent implementation
+    /// `tests/reference/sea_and_scattering.py`: one unit of the last digit.
     #[test]
     fn growing_seas_meet_the_reference() {
         for (wind, fetch, height, period, level) in [
@@ -143,7 +143,7 @@ mod tests {
             assert!((TAU / model.peak_frequency - period).abs() < 1e-2);
             assert!((model.level - level).abs() < 1e-5);
         }
-        // The laws without their end, for older seas (5 m/s over 40 km, 7 m/s over 70 km): same script.
+        // The laws without the transition, for older seas (5 m/s over 40 km, 7 m/s over 70 km): same script.
         for (level, period, height) in [(0.00907, 3.53, 0.652), (0.00930, 4.76, 1.200)] {
             let hs = 4.0 * variance(&Jonswap::with(level, TAU / period, 3.3)).sqrt();
             // The period has three digits and enters squared.
@@ -151,8 +151,8 @@ mod tests {
         }
     }
 
-    /// Beyond full development the spectrum is that of Pierson and Moskowitz, and it gets there continuously,
-    /// the wave height never falling with the fetch.
+    /// Beyond full development the spectrum is that of Pierson and Moskowitz, reached continuously, with a wave height that
+    /// never decreases with the fetch.
     #[test]
     fn growth_ends_in_the_developed_sea() {
         let wind = 5.0;
@@ -168,7 +168,7 @@ mod tests {
             })
             .collect();
         for pair in heights.windows(2) {
-            // Growth below full development is about √ξ^1.1: 0.2 % a step; never a jump, never a fall.
+            // Growth below full development is about √ξ^1.1, 0.2 % per step, without jumps or decreases.
             assert!(pair[1] > pair[0] * (1.0 - 1e-9) && pair[1] < pair[0] * 1.003);
         }
     }

@@ -4,18 +4,18 @@
 //! ⟨ζ²⟩ = ∫S(k) dk = ∬Ψ(kx, ky) dkx dky      Ψ = S(k) D(k, φ)/k, ∫D dφ = 1      B(k) = k³ S(k)
 //! ```
 //!
-//! One file per author's model, each for deep water.
+//! There is one file per published model, each for deep water.
 //!
 //! # Finite depth
 //!
-//! Over water of depth h all models keep their curvature spectrum B at equal frequency (Kitaigorodskii,
-//! Krasitskii and Zaslavskii 1975; the TMA spectrum of Bouws et al. 1985 is JONSWAP so treated):
+//! Over water of depth h, all models keep their curvature spectrum B at equal frequency (Kitaigorodskii, Krasitskii and
+//! Zaslavskii 1975; the TMA spectrum of Bouws et al. 1985 is JONSWAP treated in this way):
 //!
 //! ```text
 //! B_h(k) = B_∞(k_∞),   k_∞ = k tanh(kh)
 //! ```
 //!
-//! which is the factor Φ of those papers on S(ω), see [`kitaigorodskii_factor`].
+//! which equals the factor Φ of those papers on S(ω), see [`kitaigorodskii_factor`].
 
 pub mod elfouhaily;
 mod jonswap;
@@ -29,7 +29,7 @@ use crate::constants::GRAVITY;
 use crate::dispersion::{angular_frequency, depth_factor, group_speed};
 use crate::scene::SpectrumModel;
 
-/// The deep-water spectrum of one sea, by one of the models.
+/// Deep-water spectrum of one sea, by one of the models.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Spectrum {
     /// Elfouhaily et al. (1997).
@@ -41,7 +41,7 @@ pub enum Spectrum {
 }
 
 impl Spectrum {
-    /// The sea that a wind U₁₀ [m/s] makes over a fetch \[m\].
+    /// Sea raised by a wind U₁₀ [m/s] over a fetch \[m\].
     #[must_use]
     pub fn new(model: SpectrumModel, wind_speed: f64, fetch: f64) -> Self {
         match model {
@@ -88,7 +88,7 @@ pub fn to_frequency(wavenumber_spectrum: f64, wavenumber: f64, depth: f64) -> f6
 
 /// Wavenumber of the deep-water gravity wave of the same frequency, k_∞ = k tanh(kh) [rad/m].
 ///
-/// Where surface tension matters (k above 50 rad/m) water of 1 m is deep, so it needs no term of its own.
+/// Where surface tension matters (k above 50 rad/m), water of 1 m is already deep, so no extra term is needed.
 #[must_use]
 pub fn deep_equivalent(wavenumber: f64, depth: f64) -> f64 {
     wavenumber * depth_factor(wavenumber, depth)
@@ -96,8 +96,8 @@ pub fn deep_equivalent(wavenumber: f64, depth: f64) -> f64 {
 
 /// The wavenumber k [rad/m] over depth h \[m\] whose deep-water equivalent k tanh(kh) is given.
 ///
-/// Newton's method on a function that is convex up to kh of about 1.2 and straight beyond; from a start above
-/// the root it falls monotonically.
+/// Newton's method on a function that is convex up to kh of about 1.2 and linear beyond; starting above the root, it
+/// decreases monotonically.
 #[must_use]
 pub fn from_deep_equivalent(deep: f64, depth: f64) -> f64 {
     if !deep.is_finite() || !depth.is_finite() || deep <= 0.0 {
@@ -116,7 +116,7 @@ pub fn from_deep_equivalent(deep: f64, depth: f64) -> f64 {
     k
 }
 
-/// Depth factor Φ of Kitaigorodskii on a frequency spectrum: `S_h(ω) = Φ S_∞(ω)` \[1\].
+/// Kitaigorodskii's depth factor Φ on a frequency spectrum: `S_h(ω) = Φ S_∞(ω)` \[1\].
 ///
 /// ```text
 /// Φ = [k⁻³ ∂k/∂ω]_h / [k⁻³ ∂k/∂ω]_∞ = (k_∞/k)³ · (g/2ω)/c_g,   gravity waves
@@ -158,7 +158,7 @@ mod tests {
         assert!((kitaigorodskii_factor(k, h) / limit - 1.0).abs() < 1e-4);
     }
 
-    /// Keeping B(k) at equal frequency is the factor Φ on S(ω), for any spectrum of long waves.
+    /// Keeping B(k) at equal frequency equals the factor Φ on S(ω), for any spectrum of long waves.
     #[test]
     fn curvature_at_equal_frequency_is_the_factor() {
         let model = PiersonMoskowitz::new(12.0);
@@ -167,7 +167,7 @@ mod tests {
             let mapped = to_frequency(model.curvature(deep) / k.powi(3), k, h);
             let omega = (GRAVITY * deep).sqrt();
             let factored = kitaigorodskii_factor(k, h) * model.frequency_spectrum(omega);
-            // Surface tension, in ω and c_g but not in the model: relative (τ/ρ)k²/g < 1e-6.
+            // Surface tension is in ω and c_g but not in the model: relative (τ/ρ)k²/g < 1e-6.
             assert!((mapped / factored - 1.0).abs() < 2e-6, "{k} {h}");
         }
     }

@@ -1,4 +1,4 @@
-//! The fully developed sea of Pierson and Moskowitz (1964).
+//! Spectrum of a fully developed sea by Pierson and Moskowitz (1964).
 
 use crate::constants::GRAVITY;
 
@@ -11,7 +11,7 @@ const CUT: f64 = 0.74;
 /// U₁₉.₅/U₁₀ \[1\]: the logarithmic profile over the sea at moderate wind. A 1/7 power law would give 1.10.
 const MAST_WIND: f64 = 1.026;
 
-/// The spectrum of a fully developed sea.
+/// Spectrum of a fully developed sea.
 ///
 /// ```text
 /// S(ω) = α g² ω⁻⁵ exp[−β (g/(U ω))⁴]      B(k) = (α/2) exp[−β (g/(U² k))²]
@@ -20,8 +20,8 @@ const MAST_WIND: f64 = 1.026;
 ///
 /// # Validity
 ///
-/// Gravity waves up to a few times the peak frequency. The tail does not depend on the wind: never take the
-/// density of the waves a radar sees from it.
+/// Gravity waves up to a few times the peak frequency. The tail does not depend on the wind: do not use it for the waves
+/// that scatter.
 ///
 /// # References
 ///
@@ -33,7 +33,7 @@ pub struct PiersonMoskowitz {
 }
 
 impl PiersonMoskowitz {
-    /// The developed sea of a wind U₁₀ [m/s].
+    /// The developed sea for a wind U₁₀ [m/s].
     #[must_use]
     pub fn new(wind_speed: f64) -> Self {
         Self {
@@ -77,7 +77,7 @@ mod tests {
     use super::*;
     use crate::spectrum::to_wavenumber;
 
-    /// ∫ωⁿ S dω by the trapezoid rule in ln ω, 200 steps an e-fold.
+    /// ∫ωⁿ S dω by the trapezoidal rule in ln ω, with 200 steps per e-fold.
     fn moment(model: &PiersonMoskowitz, n: i32, upper: f64) -> f64 {
         let (low, step) = ((0.2 * model.peak_frequency()).ln(), 0.005);
         let count = ((upper.ln() - low) / step) as i32;
@@ -89,7 +89,7 @@ mod tests {
             .sum()
     }
 
-    /// Hs = 0.02133 U², `σ_v` = 0.0646 U (closed forms, three digits), and the table's heights.
+    /// Hs = 0.02133 U², `σ_v` = 0.0646 U (closed forms, three digits), and the heights of the table.
     #[test]
     fn moments_are_the_closed_forms() {
         for (wind, height) in [(3.0, 0.202), (5.0, 0.561), (7.0, 1.100)] {
@@ -98,7 +98,7 @@ mod tests {
             assert!((hs - height).abs() < 1e-3, "{wind} {hs}");
             let closed = 2.0 * (LEVEL / CUT).sqrt() * model.wind.powi(2) / GRAVITY;
             assert!((hs / closed - 1.0).abs() < 1e-6);
-            // ∫ω²S converges as ω⁻²: cut at 1e4 rad/s it lacks less than 1e-7.
+            // ∫ω²S converges as ω⁻²: cut at 1e4 rad/s it misses less than 1e-7.
             let speed = moment(&model, 2, 1e4).sqrt();
             assert!((speed / model.wind - 0.0646).abs() < 5e-5);
         }
@@ -110,7 +110,7 @@ mod tests {
         for k in [0.01, 0.05, 0.4] {
             let omega = (GRAVITY * k).sqrt();
             let s = to_wavenumber(model.frequency_spectrum(omega), k, f64::INFINITY);
-            // The group speed knows surface tension: relative 3(τ/ρ)k²/g below 4e-6.
+            // The group speed includes surface tension: relative 3(τ/ρ)k²/g below 4e-6.
             assert!((s * k.powi(3) / model.curvature(k) - 1.0).abs() < 4e-6);
         }
     }

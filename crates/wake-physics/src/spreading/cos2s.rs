@@ -1,9 +1,9 @@
-//! The cos-2s spreading of Longuet-Higgins, with the exponents of Hasselmann and of Mitsuyasu.
+//! Longuet-Higgins' cos-2s spreading, with the exponents of Hasselmann and of Mitsuyasu.
 
 use crate::constants::GRAVITY;
 use std::f64::consts::PI;
 
-/// Cos-2s spreading: most waves run with the wind.
+/// Cos-2s spreading: most waves travel with the wind.
 ///
 /// ```text
 /// D(δ) = Γ(s+1)/(2√π Γ(s+½)) · cos^{2s}(δ/2),   cos²(δ/2) = (1 + cos δ)/2
@@ -11,12 +11,12 @@ use std::f64::consts::PI;
 /// Mitsuyasu   s = s_max · min[x⁵, x^−2.5],      s_max = 11.5 (U/c_p)^−2.5
 /// ```
 ///
-/// with `x = f/f_p = √(k/k_p)` and `c_p = √(g/k_p)`. Hasselmann et al. change branches at 1.05 `f_p`; the
-/// branches cross between `f_p` and 1.06 `f_p`, and taking the smaller one makes s continuous.
+/// with `x = f/f_p = √(k/k_p)` and `c_p = √(g/k_p)`. Hasselmann et al. switch branches at 1.05 `f_p`; the branches cross
+/// between `f_p` and 1.06 `f_p`, and taking the smaller one makes s continuous.
 ///
 /// # Validity
 ///
-/// `U/c_p` from about 1 to 2 and frequencies up to a few `f_p`; far above, s goes to 0 and the waves spread evenly
+/// `U/c_p` from about 1 to 2 and frequencies up to a few `f_p`; far above, s tends to 0 and the waves are spread evenly
 /// over the circle.
 ///
 /// # References
@@ -26,9 +26,9 @@ use std::f64::consts::PI;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cos2s {
     peak_wavenumber: f64,
-    /// Level and power of x below the peak.
+    /// Level and exponent of x below the peak.
     below: [f64; 2],
-    /// Level and power of x above the peak.
+    /// Level and exponent of x above the peak.
     above: [f64; 2],
 }
 
@@ -55,7 +55,7 @@ impl Cos2s {
         }
     }
 
-    /// The exponent s \[1\] at deep-water wavenumber k [rad/m].
+    /// Exponent s \[1\] at deep-water wavenumber k [rad/m].
     #[must_use]
     pub fn exponent(&self, wavenumber: f64) -> f64 {
         let ln_x = 0.5 * (wavenumber / self.peak_wavenumber).ln();
@@ -63,13 +63,13 @@ impl Cos2s {
         branch(self.below).min(branch(self.above))
     }
 
-    /// The factor Γ(s+1)/(2√π Γ(s+½)) [1/rad], so that ∫D = 1.
+    /// Factor Γ(s+1)/(2√π Γ(s+½)) [1/rad], which makes ∫D = 1.
     #[must_use]
     pub fn normalization(exponent: f64) -> f64 {
         gamma_ratio(exponent) / (2.0 * PI.sqrt())
     }
 
-    /// D(δ) of one deep-water wavenumber [rad/m].
+    /// D(δ) at a deep-water wavenumber [rad/m].
     pub(super) fn at(&self, wavenumber: f64) -> Spread {
         let exponent = self.exponent(wavenumber);
         Spread::Cos2s {
@@ -96,7 +96,7 @@ fn gamma_ratio(s: f64) -> f64 {
     (libm::lgamma(s + 1.0) - libm::lgamma(s + 0.5)).exp()
 }
 
-/// The spreading of the waves of one length.
+/// Spreading of the waves of one wavenumber.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Spread {
     /// D(δ) = level · cos^{2s}(δ/2).
@@ -134,12 +134,12 @@ mod tests {
             (1.0, 2.0 / root),
             (10.0, eleven),
         ] {
-            // ln Γ, below 16 here, to some 2 units of 2e-16 of itself, twice; then the exponential.
+            // ln Γ, below 16 here, errs by a few units of 2e-16 relative, twice; then the exponential.
             assert!((gamma_ratio(s) / expected - 1.0).abs() < 2e-14, "{s}");
         }
     }
 
-    /// The published exponents, and OCEANSAR's form of them in k.
+    /// The published exponents, and OCEANSAR's version of them in k.
     #[test]
     fn exponents_are_the_published_ones() {
         let (wind, age) = (5.0f64, 1.17);
@@ -160,7 +160,7 @@ mod tests {
         assert!((mitsuyasu.exponent(peak) / (11.5 * age.powf(-2.5)) - 1.0).abs() < 1e-12);
     }
 
-    /// Most waves run with the wind, and the exponent has no jump.
+    /// Most waves travel with the wind, and the exponent is continuous.
     #[test]
     fn the_spread_is_continuous_and_points_downwind() {
         let spreading = Cos2s::hasselmann(10.0, 0.2);

@@ -1,9 +1,9 @@
-//! The even spreading of Elfouhaily et al. (1997).
+//! Even spreading of Elfouhaily et al. (1997).
 
 use super::cos2s::Spread;
 use crate::spectrum::Elfouhaily;
 
-/// Even spreading: more waves along the wind than across it, as many against it as with it.
+/// Even spreading: more waves along the wind than across it, and as many against it as with it.
 ///
 /// ```text
 /// D(k, δ) = (1 + Δ(k) cos 2δ)/(2π)
@@ -11,8 +11,8 @@ use crate::spectrum::Elfouhaily;
 ///
 /// # Validity
 ///
-/// Right for what a radar sees at one instant. As a spread of travelling waves it lets half of them run
-/// against the wind; prefer [`Cos2s`](super::Cos2s) there.
+/// Valid for the instantaneous surface that a radar images. As a spreading of travelling waves it makes half of them run
+/// against the wind; use [`Cos2s`](super::Cos2s) instead.
 ///
 /// # References
 ///
@@ -35,7 +35,7 @@ impl EvenSpreading {
         self.sea.anisotropy(wavenumber)
     }
 
-    /// D(δ) of one deep-water wavenumber [rad/m].
+    /// D(δ) at a deep-water wavenumber [rad/m].
     pub(super) fn at(&self, wavenumber: f64) -> Spread {
         Spread::Even {
             anisotropy: self.anisotropy(wavenumber),

@@ -1,4 +1,4 @@
-//! How waves spread around the wind: D(k, δ) with ∫D dδ = 1 over the full circle.
+//! Directional spreading of waves around the wind: D(k, δ) with ∫D dδ = 1 over the full circle.
 
 mod cos2s;
 mod elfouhaily;
@@ -10,19 +10,19 @@ pub use elfouhaily::EvenSpreading;
 use crate::scene::SpreadingModel;
 use crate::spectrum::Elfouhaily;
 
-/// The spreading of one sea, by one of the models.
+/// Spreading of one sea, by one of the models.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Spreading {
-    /// cos-2s: most waves run with the wind.
+    /// cos-2s: most waves travel with the wind.
     Cos2s(Cos2s),
     /// Elfouhaily et al. (1997): even.
     Even(EvenSpreading),
 }
 
 impl Spreading {
-    /// The spreading around a wind U₁₀ [m/s] of a sea with deep-water peak `k_p` [rad/m].
+    /// Spreading around a wind U₁₀ [m/s] for a sea with deep-water peak `k_p` [rad/m].
     ///
-    /// The even spreading is that of Elfouhaily's own sea of this wind and fetch \[m\].
+    /// The even spreading is that of Elfouhaily's sea for this wind and fetch \[m\].
     #[must_use]
     pub fn new(model: SpreadingModel, wind_speed: f64, fetch: f64, peak_wavenumber: f64) -> Self {
         match model {
@@ -42,7 +42,7 @@ impl Spreading {
         self.at(wavenumber).density(cos_angle)
     }
 
-    /// The spreading of the waves of one deep-water wavenumber [rad/m].
+    /// Spreading of the waves at a deep-water wavenumber [rad/m].
     pub(crate) fn at(&self, wavenumber: f64) -> Spread {
         match self {
             Self::Cos2s(model) => model.at(wavenumber),
@@ -50,7 +50,7 @@ impl Spreading {
         }
     }
 
-    /// Second harmonic ∫D cos 2δ dδ \[1\]: 1 for waves all along the wind, 0 for none preferred, −1 all across.
+    /// Second harmonic ∫D cos 2δ dδ \[1\]: 1 if all waves run along the wind, 0 without preference, −1 if all run across.
     #[must_use]
     pub fn second_harmonic(&self, wavenumber: f64) -> f64 {
         match self {
@@ -66,7 +66,7 @@ mod tests {
     use crate::constants::GRAVITY;
     use std::f64::consts::TAU;
 
-    /// Integral 1 and the second harmonic, by the trapezoid rule over the circle.
+    /// The integral is 1 and the second harmonic matches, by the trapezoidal rule over the circle.
     #[test]
     fn spreads_integrate_to_one() {
         for model in [
@@ -87,8 +87,8 @@ mod tests {
                         sum += d * TAU / f64::from(n);
                         second += d * (2.0 * delta).cos() * TAU / f64::from(n);
                     }
-                    // The rule is exact to rounding for smooth spreads; for s below 1 the cusp at δ = π,
-                    // |π − δ|^2s, leaves a step^(1+2s) error, at most one step.
+                    // The rule is exact up to rounding for smooth spreads; for s below 1 the cusp at δ = π,
+                    // |π − δ|^2s, causes an error of step^(1+2s), at most one step.
                     let bound = 2.0 / f64::from(n);
                     assert!((sum - 1.0).abs() < bound, "{model:?} {age} {ratio} {sum}");
                     assert!((second - spreading.second_harmonic(k)).abs() < bound);

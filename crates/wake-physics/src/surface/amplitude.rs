@@ -1,4 +1,4 @@
-//! Mean amplitude of every wave of a lattice, by a table over |k| and an elementary function of the direction.
+//! Mean amplitude of every wave of a lattice, from a table over |k| and an elementary function of direction.
 
 use super::wave_lattice::WaveLattice;
 use crate::numeric::vector::{exp_f32, ln_f32};
@@ -8,13 +8,13 @@ use crate::wind_sea::{DirectionalSpectrum, GAUSS_8};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// Low bits of k² between nodes: 2⁷ nodes an octave. Linear interpolation of a power k⁻ⁿ errs by n²/2¹⁷ at most.
+/// Low bits of k² between nodes: 2⁷ nodes per octave. Linear interpolation of a power k⁻ⁿ errs by at most n²/2¹⁷.
 const SHIFT: u32 = 16;
 
-/// The lattice samples the peak well enough from this many steps on: narrower peaks are averaged over cells.
+/// Peak wavenumber in lattice steps from which the lattice samples the peak well; below it, densities are cell averages.
 const SAMPLED_PEAK: f64 = 8.0;
 
-/// Radius in steps within which densities are averaged over cells where the peak is not sampled.
+/// Radius in lattice steps within which densities are then averaged over cells.
 const AVERAGED_RADIUS: f64 = 16.0;
 
 /// Amplitudes √(2Ψ dkx dky) of the waves of a lattice \[m\]: twice the square is their mean variance.
@@ -26,7 +26,7 @@ pub(super) struct Amplitudes<'a> {
     wind: [f32; 2],
     /// Bits of k² at node 0, shifted.
     first: u32,
-    /// Nodes: amplitude without its direction \[m\], and shape: s/2 or Δ \[1\].
+    /// Nodes: amplitude without its directional factor \[m\], and shape: s/2 or Δ \[1\].
     nodes: Vec<[f32; 2]>,
 }
 
@@ -63,7 +63,7 @@ impl<'a> Amplitudes<'a> {
         }
     }
 
-    /// Amplitudes of the waves k and −k of a piece of a line.
+    /// Amplitudes of the waves k and −k for a part of a line.
     #[inline(always)]
     pub(super) fn fill(&self, kx: f64, ky: &[f32], along: &mut [f32], against: &mut [f32]) {
         let x = kx as f32;
@@ -104,7 +104,7 @@ impl<'a> Amplitudes<'a> {
         ]
     }
 
-    /// Replaces the amplitudes of long waves by those of the density averaged over the cell.
+    /// Replaces the amplitudes of long waves by those of cell-averaged densities.
     fn average(&self, kx: f64, ky: &[f32], along: &mut [f32], against: &mut [f32]) {
         for ((&ky, along), against) in ky.iter().zip(along).zip(against) {
             let ky = f64::from(ky);
@@ -130,7 +130,7 @@ impl<'a> Amplitudes<'a> {
     }
 }
 
-/// Level √(2 S dkx dky D₀/k), where D₀ does not depend on the direction, and shape of the spreading at k.
+/// Level √(2 S dkx dky D₀/k), with D₀ independent of direction, and shape of the spreading at k.
 fn node(spectrum: &DirectionalSpectrum, cell: [f64; 2], k: f64) -> [f32; 2] {
     let deep = deep_equivalent(k, spectrum.depth());
     let (shape, spread) = match spectrum.spreading() {
@@ -151,7 +151,7 @@ mod tests {
     use crate::scene::{SpectrumModel, SpreadingModel};
     use crate::wind_sea::WindSea;
 
-    /// The table and the fast functions against Ψ itself, wave by wave.
+    /// Table and fast functions against Ψ itself, wave by wave.
     #[test]
     fn amplitudes_are_those_of_the_density() {
         let lattice = WaveLattice {

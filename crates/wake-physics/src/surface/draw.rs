@@ -1,4 +1,4 @@
-//! Draws the random amplitudes of a sea, line by line.
+//! Random amplitudes of a sea, drawn line by line.
 
 use super::amplitude::Amplitudes;
 use super::wave_lattice::WaveLattice;
@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// How amplitudes scatter around their mean.
+/// Distribution of amplitudes around their mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Scatter {
     /// Complex Gaussian.
@@ -23,7 +23,7 @@ pub(super) enum Scatter {
     Phase,
 }
 
-/// What the amplitudes of one sea depend on.
+/// Inputs that determine the amplitudes of one sea.
 pub(super) struct Draw<'a> {
     lattice: WaveLattice,
     amplitudes: Amplitudes<'a>,
@@ -31,17 +31,17 @@ pub(super) struct Draw<'a> {
     seed: u64,
     time: f64,
     scatter: Scatter,
-    /// ky of every index [rad/m].
+    /// ky at every index [rad/m].
     ky: Vec<f32>,
     /// Phase of pixel `[0, 0]`, by index and by line [2⁻³² turns].
     place: [Vec<u32>; 2],
 }
 
-/// Workspace of one line.
+/// Buffers for one line.
 struct Workspace {
     /// Mean amplitudes of k and of −k.
     level: [Vec<f32>; 2],
-    /// Random bits of k and of −k: of the modulus, of the phase.
+    /// Random bits of k and of −k: for the modulus and the phase.
     bits: [Vec<[u32; 2]>; 2],
     /// ωt [2⁻³² turns].
     motion: Vec<u32>,
@@ -73,8 +73,8 @@ impl<'a> Draw<'a> {
         }
     }
 
-    /// Even and odd parts ½(c(k) ± c*(−k)) of the amplitudes of all lines, phases at pixel `[0, 0]`, and their
-    /// mean variance \[m²\]; written into two blocks of any content.
+    /// Even and odd parts ½(c(k) ± c*(−k)) of the amplitudes of all lines, with phases at pixel `[0, 0]`, and their mean
+    /// variance \[m²\]; written into two buffers with any content.
     pub(super) fn run(
         &self,
         [mut even, mut odd]: [Vec<Complex32>; 2],
@@ -148,7 +148,7 @@ impl<'a> Draw<'a> {
         }
     }
 
-    /// ωt in turns: in double precision, so that the phase of the longest time is still right.
+    /// ωt in turns, in double precision to keep the phase accurate at the longest time.
     fn motion(&self, line: usize, range: Range<usize>, work: &mut Workspace) {
         if self.time == 0.0 {
             return;
@@ -207,7 +207,7 @@ impl Workspace {
         }
     }
 
-    /// Σ½ level² over both sides; on line 0 the second side is the first again.
+    /// Σ½ level² over both sides; on line 0 the second side repeats the first.
     #[inline(always)]
     fn variance(&self, line: usize, range: Range<usize>) -> f64 {
         let sides = if line == 0 { 1 } else { 2 };
@@ -220,7 +220,7 @@ impl Workspace {
         self.level[..sides].iter().map(squares).sum()
     }
 
-    /// On line 0 the wave −k is another wave of the line.
+    /// On line 0, the wave −k is another wave of the same line.
     fn mirror(&mut self, lattice: &WaveLattice) {
         let [waves, mirrored] = &mut self.waves;
         for n in lattice.disk(0).into_iter().flatten() {
@@ -234,7 +234,7 @@ fn words(bits: u64) -> [u32; 2] {
     [(bits >> 32) as u32, bits as u32]
 }
 
-/// Phases of a pixel `shift` pixels from the origin, n·shift/period for each n of a period [2⁻³² turns].
+/// Phases of a pixel `shift` pixels from the origin, n·shift/period for every n of a period [2⁻³² turns].
 fn turns(shift: i64, period: usize) -> Vec<u32> {
     let step = shift.rem_euclid(period as i64) as u64;
     let period = period as u64;

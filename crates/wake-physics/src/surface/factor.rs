@@ -1,4 +1,4 @@
-//! Fields of a line of waves from the even and odd parts of their amplitudes.
+//! Half spectra of a line of waves, from the even and odd parts of their amplitudes.
 //!
 //! A real field has the half spectrum H(k) = ½(T(k) c(k) + T*(−k) c*(−k)). With E and O = ½(c(k) ± c*(−k))
 //! and the factors T of [`Transfer::factor`], each quantity needs one or both of E and O.
@@ -10,7 +10,7 @@ use crate::waves::{LARGEST_MODULATING_WAVENUMBER, Quantity, Transfer};
 use num_complex::{Complex, Complex32};
 use std::ops::Range;
 
-/// What the waves of a line have in common, and what differs from wave to wave.
+/// Common and individual parameters of the waves of a line.
 pub(super) struct LineWaves<T> {
     kx: T,
     /// ω [rad/s].
@@ -19,7 +19,7 @@ pub(super) struct LineWaves<T> {
     orbital: Vec<T>,
 }
 
-/// Factors that are the same for every wave.
+/// Factors common to all waves.
 pub(super) struct Factors<'a, T> {
     lattice: &'a WaveLattice,
     ky: Vec<T>,
@@ -78,7 +78,7 @@ impl<'a, T: Lane> Factors<'a, T> {
         LineWaves { kx, omega, orbital }
     }
 
-    /// Writes a piece of the half spectrum of a quantity.
+    /// Writes a part of the half spectrum of a quantity.
     #[inline(always)]
     pub(super) fn fill(
         &self,

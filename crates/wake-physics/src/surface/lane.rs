@@ -1,9 +1,9 @@
-//! The arithmetic of one precision: single by series, double by the standard library.
+//! Arithmetic in one precision: single by series, double by the standard library.
 
 use crate::fft::Real;
 use crate::numeric::vector::tanh_f32;
 
-/// The arithmetic of one precision beyond what an FFT needs.
+/// Arithmetic operations beyond what an FFT needs.
 pub(super) trait Lane: Real + PartialOrd {
     /// Rounds a constant.
     fn constant(value: f64) -> Self;

@@ -1,4 +1,4 @@
-//! One random sea: its waves, and any field of them on a raster by FFT.
+//! A random sea: its waves, and fields of them on a raster by FFT.
 
 mod amplitude;
 mod draw;
@@ -22,10 +22,10 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 use wave_lattice::WaveLattice;
 
-/// From this tolerance on single precision is enough: its error stays below a quarter of it.
+/// Smallest tolerance at which single precision suffices: its error stays below a quarter of it.
 const SINGLE_PRECISION_TOLERANCE: f64 = 2e-5;
 
-/// Variances Ψ dkx dky \[m²\] of the waves along +k of a square lattice, |k| ≤ π/spacing, in the order of [`crate::fft`].
+/// Variances Ψ dkx dky \[m²\] of the waves along +k on a square lattice, |k| ≤ π/spacing, in the order of [`crate::fft`].
 ///
 /// # Shapes
 ///
@@ -65,7 +65,7 @@ pub(crate) fn wave_variances(
     variances
 }
 
-/// Rows and columns of the lattice that a sea on a raster is drawn on.
+/// Rows and columns of the lattice on which the sea of a raster is drawn.
 pub(crate) fn lattice_size(spectrum: &DirectionalSpectrum, raster: &Raster) -> [usize; 2] {
     let lattice = WaveLattice::new(raster, TAU / spectrum.peak_wavenumber());
     [lattice.rows, lattice.columns]
@@ -77,18 +77,17 @@ pub(crate) fn lattice_size(spectrum: &DirectionalSpectrum, raster: &Raster) -> [
 /// ζ(x, y) = Σ Re[c(k) exp(i(kx·x + ky·y))],   c(k) = √(2Ψ(k) dkx dky) · g · e^{−iωt},   ⟨|g|²⟩ = 1
 /// ```
 ///
-/// over the waves k of a periodic lattice, larger than the raster by a guard so that nothing wraps, with
-/// |k| ≤ π/spacing. The g are complex Gaussian. Where the lattice is too coarse for the spectral peak, Ψ is
-/// averaged over cells, so that the variance is right all the same; what no wave of the lattice can carry is
-/// [`Self::left_out`].
+/// over the waves k of a periodic lattice with |k| ≤ π/spacing, larger than the raster by a guard so that nothing wraps
+/// around. The g are complex Gaussian. Where the lattice is too coarse for the spectral peak, Ψ is averaged over cells to
+/// keep the variance right; variance that no wave of the lattice can represent is [`Self::left_out`].
 ///
-/// The seed fixes every wave, whatever the number of threads.
+/// The seed determines every wave, for any number of threads.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Surface {
     raster: Raster,
     lattice: WaveLattice,
     depth: f64,
-    /// ½(c(k) + c*(−k)) of the lines b ≥ 0, phases at pixel `[0, 0]`.
+    /// ½(c(k) + c*(−k)) of the lines b ≥ 0, with phases at pixel `[0, 0]`.
     even: Vec<Complex32>,
     /// ½(c(k) − c*(−k)).
     odd: Vec<Complex32>,
@@ -100,16 +99,16 @@ impl Surface {
     /// Draws a sea.
     ///
     /// - `spectrum`: density of the waves
-    /// - `seed`: of the random numbers
-    /// - `time` t \[s\], from 0 to 10⁵: each wave has moved along its k by ωt
-    /// - `raster`: of the fields, margins included
+    /// - `seed` of the random numbers
+    /// - `time` t \[s\], from 0 to 10⁵: each wave has advanced along its k by the phase ωt
+    /// - `raster` of the fields, margins included
     #[must_use]
     pub fn new(spectrum: &DirectionalSpectrum, seed: u64, time: f64, raster: &Raster) -> Self {
         let mut workspace = Workspace::default();
         Self::new_in(&mut workspace, spectrum, seed, time, raster)
     }
 
-    /// [`Self::new`] in blocks of a workspace; [`Self::give_back`] returns them.
+    /// [`Self::new`] with buffers from a workspace; [`Self::give_back`] returns them.
     pub(crate) fn new_in(
         workspace: &mut Workspace,
         spectrum: &DirectionalSpectrum,
@@ -152,31 +151,31 @@ impl Surface {
         }
     }
 
-    /// Puts the blocks of the amplitudes back.
+    /// Returns the buffers of the amplitudes to the workspace.
     pub(crate) fn give_back(self, workspace: &mut Workspace) {
         workspace.spectra.0.give(self.even);
         workspace.spectra.0.give(self.odd);
     }
 
-    /// Whether there is no resolved wave.
+    /// Whether there are no resolved waves.
     fn is_flat(&self) -> bool {
         self.carried <= 0.0
     }
 
-    /// Expected variance ⟨ζ²⟩ of the waves, over seeds \[m²\].
+    /// Expected variance ⟨ζ²⟩ of the waves over all seeds \[m²\].
     #[must_use]
     pub fn variance(&self) -> f64 {
         self.carried
     }
 
-    /// Share of the resolved variance, |k| from 0 to π/spacing, that no wave of the lattice carries \[1\]: waves
-    /// longer than the period. 0 to about 10⁻³, the accuracy of sum and integral, where the peak is resolved.
+    /// Share of the resolved variance, |k| from 0 to π/spacing, that no wave of the lattice represents \[1\]: waves longer
+    /// than the period. If the peak is resolved, 0 to about 10⁻³, the accuracy of sum and integral.
     #[must_use]
     pub fn left_out(&self) -> f64 {
         self.left_out
     }
 
-    /// The waves one by one, for a harmonic sum: exactly those that [`Self::fields`] adds up.
+    /// The individual waves, for a harmonic sum: exactly those summed by [`Self::fields`].
     #[must_use]
     pub fn modes(&self) -> PlaneWaves {
         let mut waves = PlaneWaves::default();
@@ -192,12 +191,12 @@ impl Surface {
         waves
     }
 
-    /// Number of lines drawn: none on a flat sea.
+    /// Number of lines drawn; 0 on a flat sea.
     fn lines(&self) -> usize {
         self.even.len() / self.lattice.rows
     }
 
-    /// c(k) and c(−k); on line 0 the second is 0, being another wave of the line.
+    /// c(k) and c(−k); on line 0 the second is 0, because it is another wave of the line.
     fn pair(&self, line: usize, index: usize) -> [Complex64; 2] {
         let n = line * self.lattice.rows + index;
         let [even, odd] = [self.even[n], self.odd[n]].map(widen);
@@ -213,7 +212,7 @@ impl Surface {
     fn push(&self, waves: &mut PlaneWaves, [line, index]: [usize; 2], sign: f64, c: Complex64) {
         let (rows, columns) = (self.lattice.rows as i64, self.lattice.columns as i64);
         let k = [sign * self.lattice.kx(line), sign * self.lattice.ky(index)];
-        // Whole turns are taken off in integers: the phase is right for any origin.
+        // Whole turns are removed in integers, so that the phase is accurate for any origin.
         let by_column = (line as i64 * self.raster.origin_column.rem_euclid(columns)) % columns;
         let by_row =
             signed_index(index, self.lattice.rows) * self.raster.origin_row.rem_euclid(rows) % rows;
@@ -237,7 +236,7 @@ impl Surface {
         self.masked(|c| c.norm_sqr() > threshold)
     }
 
-    /// The same sea with only the waves whose amplitude is kept.
+    /// The same sea with only the waves whose amplitude satisfies `keep`.
     fn masked(&self, keep: impl Fn(Complex64) -> bool) -> Self {
         let rows = self.lattice.rows;
         let mut masked = self.clone();
@@ -255,11 +254,11 @@ impl Surface {
         masked
     }
 
-    /// Fields of the sea on its raster, in the order asked for: two for one FFT.
+    /// Fields of the sea on its raster, in the order of `quantities`, two per FFT.
     ///
-    /// - `transfer` whose depth is that of the sea
-    /// - `tolerance` largest error relative to the root mean square of a field, down to 10⁻⁶; from 2·10⁻⁵ on
-    ///   in single precision
+    /// - `transfer`: its depth must be that of the sea
+    /// - `tolerance`: largest error relative to the root mean square of a field, at least 10⁻⁶; single precision is used
+    ///   from 2·10⁻⁵ upward
     #[must_use]
     pub fn fields(
         &self,
@@ -271,7 +270,7 @@ impl Surface {
         self.strip_in(workspace, &rows, transfer, quantities, tolerance)
     }
 
-    /// Some rows of [`Self::fields`], in blocks of a workspace.
+    /// Some rows of [`Self::fields`], with buffers from a workspace.
     pub(crate) fn strip_in(
         &self,
         workspace: &mut Workspace,
@@ -293,7 +292,7 @@ impl Surface {
         fields
     }
 
-    /// Overwrites all of the fields.
+    /// Overwrites the fields.
     fn synthesize<T: Lane>(
         &self,
         workspace: &mut Workspace,

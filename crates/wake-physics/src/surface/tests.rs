@@ -37,7 +37,7 @@ fn surface(sea: &WindSea, raster: &Raster) -> Surface {
     Surface::new(&DirectionalSpectrum::new(sea), 7, 0.0, raster)
 }
 
-/// The sea whose every amplitude has its mean modulus.
+/// A sea in which every amplitude has its mean modulus.
 fn steady(sea: &WindSea, raster: &Raster) -> Surface {
     Surface::draw(
         &DirectionalSpectrum::new(sea),
@@ -59,7 +59,7 @@ fn mode_variance(waves: &PlaneWaves, factor: impl Fn([f64; 2], f64) -> Complex64
         .sum()
 }
 
-/// Every quantity at some pixels against the harmonic sum of the same waves, to the tolerance asked for.
+/// Every quantity at some pixels against the harmonic sum of the same waves, within the requested tolerance.
 #[test]
 fn fields_are_the_harmonic_sum() {
     let raster = Raster {
@@ -92,7 +92,7 @@ fn fields_are_the_harmonic_sum() {
     }
 }
 
-/// An odd number of quantities, repeated ones, none: each field is the same whatever stands beside it.
+/// An odd number of quantities, repeated ones, none: each field is independent of the others requested.
 #[test]
 fn fields_do_not_depend_on_their_company() {
     let raster = Raster::image(30, 20, 2.0);
@@ -111,8 +111,8 @@ fn fields_do_not_depend_on_their_company() {
     assert!(sea.fields(&transfer(SEA.depth), &[], 1e-3).is_empty());
 }
 
-/// Waves and those left out make up the integral of the spectrum, wherever the peak lies: from far below the
-/// lattice's first wave to beyond the smallest wave of a pixel.
+/// The variances of the waves and of those left out sum to the integral of the spectrum, wherever the peak lies: from far
+/// below the lattice's first wave to beyond the shortest wave of a pixel.
 #[test]
 fn variance_is_that_of_the_spectrum() {
     for model in [
@@ -175,7 +175,7 @@ fn slopes_and_velocities_have_the_variance_of_the_band() {
             ] {
                 assert!((sum / integral - 1.0).abs() < 5e-3);
             }
-            // ⟨u_z²⟩ = ∫ω²S: seen straight from above.
+            // ⟨u_z²⟩ = ∫ω²S: viewed from directly above.
             let vertical = spectrum
                 .moments(0.0, raster.nyquist_wavenumber(), 0.0)
                 .radial_velocity;
@@ -184,7 +184,7 @@ fn slopes_and_velocities_have_the_variance_of_the_band() {
     }
 }
 
-/// Wavenumbers as keys.
+/// Key of a wavenumber for hashing.
 fn key(kx: f64, ky: f64) -> (i64, i64) {
     ((kx * 1e6).round() as i64, (ky * 1e6).round() as i64)
 }
@@ -221,7 +221,7 @@ fn mean_square_is_the_sum_over_waves() {
     }
 }
 
-/// Complex Gaussian amplitudes: mean |g|² is 1 and mean |g|⁴ is 2, phases even, within 5 standard errors.
+/// Complex Gaussian amplitudes: mean |g|² is 1, mean |g|⁴ is 2 and phases are uniform, within 5 standard errors.
 #[test]
 fn amplitudes_are_gaussian() {
     let raster = Raster::image(200, 200, 2.5);
@@ -229,7 +229,7 @@ fn amplitudes_are_gaussian() {
         surface(&SEA, &raster).modes(),
         steady(&SEA, &raster).modes(),
     );
-    // Waves so weak that rounding of their opposite wave covers them are left aside.
+    // Waves so weak that they are lost in the rounding of the opposite wave are skipped.
     let means: HashMap<_, _> = (0..mean.len())
         .map(|n| (key(mean.kx[n], mean.ky[n]), mean.amplitude[n].norm()))
         .collect();
@@ -258,7 +258,7 @@ fn amplitudes_are_gaussian() {
     }
 }
 
-/// The height of the waves is that of the band, whatever the number of pixels.
+/// The wave height is that of the band for any number of pixels.
 #[test]
 fn height_does_not_depend_on_the_size() {
     let heights: Vec<f64> = [16, 64, 250, 512]
@@ -269,7 +269,7 @@ fn height_does_not_depend_on_the_size() {
     }
 }
 
-/// After a time t each wave has the phase −ωt more, which is a move along +k; right to 10⁻⁶ after a day.
+/// After a time t each wave has the additional phase −ωt, a motion along +k; accurate to 10⁻⁶ after a day.
 #[test]
 fn waves_travel_along_their_wavenumber() {
     let (raster, spectrum) = (Raster::image(40, 40, 1.0), DirectionalSpectrum::new(&SEA));
@@ -297,7 +297,7 @@ fn waves_travel_along_their_wavenumber() {
             );
         }
     }
-    // The strongest wave alone: its field moves by the phase speed along k.
+    // A single wave, the strongest: its field moves by the phase speed along k.
     let one = Surface::new(&spectrum, 5, 0.0, &raster).strongest(1);
     let wave = one.modes();
     assert_eq!(wave.len(), 1);
@@ -315,7 +315,7 @@ fn waves_travel_along_their_wavenumber() {
     }
 }
 
-/// Wind mirrored in the y-axis: every wave has its mirror image's amplitude.
+/// Wind mirrored in the y-axis: every wave has the amplitude of its mirror image.
 #[test]
 fn mirrored_wind_makes_mirrored_waves() {
     let raster = Raster::image(40, 40, 2.0);
@@ -338,7 +338,7 @@ fn mirrored_wind_makes_mirrored_waves() {
             .unwrap_or(0.0);
         assert!((one.amplitude[n].norm() - mirror).abs() < 1e-5 * largest);
     }
-    // And a wind given with whole turns more is the same wind.
+    // A wind direction with additional whole turns is the same wind.
     let turned = WindSea {
         wind_toward: SEA.wind_toward + 3.0 * TAU,
         ..SEA
@@ -348,7 +348,7 @@ fn mirrored_wind_makes_mirrored_waves() {
     assert!(fields[0][0].difference(&fields[1][0]).0 < 1e-5 * fields[0][0].rms());
 }
 
-/// The same pixel has the same sea wherever the raster has its origin.
+/// A pixel has the same sea wherever the origin of the raster lies.
 #[test]
 fn the_sea_belongs_to_the_plane() {
     let raster = Raster::image(40, 60, 2.0);
@@ -367,7 +367,7 @@ fn the_sea_belongs_to_the_plane() {
     }
 }
 
-/// Nothing wraps: the covariance across the raster is that of the infinite sea, not that of a periodic one.
+/// Nothing wraps around: the covariance across the raster is that of an infinite sea, not of a periodic one.
 #[test]
 fn opposite_edges_are_strangers() {
     for (wind_speed, size) in [(5.0, 256), (9.0, 512)] {
@@ -388,7 +388,7 @@ fn opposite_edges_are_strangers() {
     }
 }
 
-/// Bit for bit the same with one thread and with two.
+/// Bit-identical with one thread and with two.
 #[test]
 fn threads_do_not_change_the_sea() {
     let raster = Raster::image(90, 70, 2.5);
@@ -439,7 +439,7 @@ fn strongest_waves_are_the_strongest() {
     assert!(sea.strongest(0).modes().is_empty());
 }
 
-/// The corners of the allowed scenes: finite, and flat where there is no wind.
+/// The extremes of the allowed scenes give finite values, and a flat sea without wind.
 #[test]
 fn corners_are_finite() {
     for (wind_speed, fetch, depth) in [

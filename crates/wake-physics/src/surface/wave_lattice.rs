@@ -1,23 +1,23 @@
-//! The lattice of wavenumbers of a periodic sea that is larger than the raster it is seen on.
+//! Lattice of wavenumbers of a periodic sea larger than its raster.
 
 use crate::fft::{fast_length, signed_index};
 use crate::raster::Raster;
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
-/// Peak wavelengths between opposite edges of the raster, around the period.
+/// Guard between opposite edges of the raster, around the period, in peak wavelengths.
 const GUARD_WAVELENGTHS: f64 = 4.0;
 
-/// Peak wavelengths in a period.
+/// Peak wavelengths per period.
 const PERIOD_WAVELENGTHS: f64 = 8.0;
 
-/// Pixels to which a period is stretched at most for the sake of long waves.
+/// Largest period in pixels to which long waves may stretch the lattice.
 const LONGEST_STRETCH: f64 = 1024.0;
 
-/// Pixels of a period at least.
+/// Smallest period in pixels.
 const LEAST_PERIOD: usize = 32;
 
-/// Pixels between opposite edges of the raster, around the period, at least.
+/// Smallest guard between opposite edges of the raster, around the period, in pixels.
 const LEAST_GUARD: usize = 8;
 
 /// The wavenumbers of a periodic sea:
@@ -26,7 +26,7 @@ const LEAST_GUARD: usize = 8;
 /// kx = b·2π/(columns·spacing),  ky = a·2π/(rows·spacing),   |k| ≤ π/spacing,  k ≠ 0,  no Nyquist line
 /// ```
 ///
-/// Stored are the lines b ≥ 0, each with the indices a in FFT order; −k stands beside k.
+/// Only the lines b ≥ 0 are stored, each with the indices a in FFT order; −k is stored beside k.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct WaveLattice {
     pub(super) rows: usize,
@@ -37,8 +37,8 @@ pub(super) struct WaveLattice {
 impl WaveLattice {
     /// The lattice for a raster and a peak wavelength \[m\].
     ///
-    /// Each period holds the raster and a guard of 4 peak wavelengths (at most a quarter of the raster), so that
-    /// opposite edges are uncorrelated, and 8 peak wavelengths (at most 1024 pixels).
+    /// Each period holds the raster and a guard of 4 peak wavelengths (at most a quarter of the raster), so that opposite
+    /// edges are uncorrelated, and at least 8 peak wavelengths (up to 1024 pixels).
     pub(super) fn new(raster: &Raster, peak_wavelength: f64) -> Self {
         let peak = peak_wavelength / raster.spacing;
         let period = |pixels: usize| {
@@ -57,7 +57,7 @@ impl WaveLattice {
         }
     }
 
-    /// Distance of lines and of indices, [dkx, dky] [rad/m].
+    /// Spacing of lines and of indices, [dkx, dky] [rad/m].
     pub(super) fn steps(&self) -> [f64; 2] {
         [self.columns, self.rows].map(|n| TAU / (n as f64 * self.spacing))
     }
@@ -82,9 +82,9 @@ impl WaveLattice {
         signed_index(index, self.rows) as f64 * self.steps()[1]
     }
 
-    /// The indices of a line within |k| ≤ π/spacing: those from 0 up, and the negative ones.
+    /// The indices of a line within |k| ≤ π/spacing: those from 0 upward, and the negative ones.
     pub(super) fn disk(&self, line: usize) -> [Range<usize>; 2] {
-        // In units of the cutoff, b·2/columns; rounding must not decide about a point on the circle.
+        // In units of the cutoff, b·2/columns; rounding must not decide on points of the circle.
         let x = 2.0 * line as f64 / self.columns as f64;
         let reach = (1.0 - x * x).max(0.0).sqrt() * 0.5 * self.rows as f64;
         let last = ((reach + 1e-9) as usize).min((self.rows - 1) / 2);

@@ -5,11 +5,11 @@
 //! σ⁰ → σ⁰ exp(clip(−T_e ∂v/∂η, ±1.2))
 //! ```
 //!
-//! η to port. The first term is the outflow of the vortex pair and of the bubbles' plume: a dark middle between two bright
-//! edges. The second is the drift of the wind that the wake mixes away: water at its sides drifts on, converges on the
-//! windward edge, which is bright, and leaves the other, which is darker. That convergence is stronger on the windward
-//! side was computed and seen by Fujimura, Soloviev and Kudryavtsev (2010), IEEE Geosci. Remote Sens. Lett. 7. The form
-//! and every constant here are chosen, some so that they resemble measured images.
+//! η is to port. The first term is the outflow of the vortex pair and of the bubble plume: a dark middle between two bright
+//! edges. The second is the wind drift that the wake mixes away: water at its sides drifts on, converges on the windward edge,
+//! which is bright, and leaves the other, which is darker. Fujimura, Soloviev and Kudryavtsev (2010), IEEE Geosci. Remote Sens.
+//! Lett. 7, computed and observed that the convergence is stronger on the windward side. The form and every constant here are
+//! chosen, some to resemble measured images.
 
 use super::width;
 use crate::kelvin::fade;
@@ -17,19 +17,19 @@ use crate::raster::{Field, Raster};
 use crate::track::Track;
 use rayon::prelude::*;
 
-/// Widths W off the track beyond which the current is below 2e-8 of itself.
+/// Widths W off the track beyond which the current is below 2e-8 of its largest value.
 const REACH: f64 = 6.0;
 
-/// Share of the wind speed that the surface drifts with, wholly lost in the wake: chosen.
+/// Surface drift over wind speed, wholly lost in the wake: chosen.
 pub const DRIFT_OF_WIND: f64 = 0.03;
 
-/// Time T in which the current falls to 1/e \[s\]: chosen within the 150 to 500 s of edges that fade in images.
+/// Time T in which the current falls to 1/e \[s\]: chosen within the 150 to 500 s in which edges fade in images.
 pub const CURRENT_DECAY: f64 = 400.0;
 
-/// Largest |ln| of the factor on σ⁰: chosen; near the stern the wake is narrow and the model too strong.
+/// Largest |ln| of the factor on σ⁰: chosen, as near the stern the wake is narrow and the model too strong.
 pub const LARGEST_CHANGE: f64 = 1.2;
 
-/// Longest time of response \[s\]: chosen. Waves that respond slower leave the wake before they have.
+/// Longest response time \[s\]: chosen. Waves that respond more slowly leave the wake first.
 pub const LONGEST_RESPONSE: f64 = 1000.0;
 
 /// The current across the wake of a ship.
@@ -46,9 +46,9 @@ pub struct WakeCurrent {
 }
 
 impl WakeCurrent {
-    /// The current in a wind.
+    /// Current in a wind.
     ///
-    /// - `wind_to_port`: component of the wind at 10 m [m/s] that blows to port
+    /// - `wind_to_port`: component to port of the wind at 10 m [m/s]
     #[must_use]
     pub fn of_wind(speed: f64, beam: f64, outflow: f64, wind_to_port: f64) -> Self {
         Self {
@@ -67,7 +67,7 @@ impl WakeCurrent {
         self.left(distance) * bell * (self.outflow * z * 0.5f64.exp() - self.drift)
     }
 
-    /// Divergence ∂v/∂η [1/s] there; the current changes so little along the wake that this is all of it.
+    /// Divergence ∂v/∂η [1/s] at the same place; the change of the current along the wake is negligible.
     ///
     /// ```text
     /// [V_o/W e^{½ − z²/2} (1 − z²) + V_d/W z e^{−z²/2}] e^{−t/T}
@@ -81,7 +81,7 @@ impl WakeCurrent {
         self.left(distance) * bell * (outflow + self.drift * z)
     }
 
-    /// What is left of the current after the time since the ship passed.
+    /// Share of the current left after the time since the ship passed.
     fn left(&self, distance: f64) -> f64 {
         (-distance.max(0.0) / (self.speed * CURRENT_DECAY)).exp()
     }
@@ -92,7 +92,7 @@ impl WakeCurrent {
 pub struct WakeEdge {
     /// The current at the stern.
     pub current: WakeCurrent,
-    /// Wind at 10 m (x, y) [m/s], of which the drift to port is where the track turns.
+    /// Wind at 10 m (x, y) [m/s]; where the track turns, its component to port sets the drift.
     pub wind: [f64; 2],
     /// Place and direction of the ship.
     pub track: Track,
@@ -102,22 +102,22 @@ pub struct WakeEdge {
     pub response: EdgeResponse,
 }
 
-/// Response `T_e` of σ⁰ to a divergence.
+/// Response time `T_e` of σ⁰ to a divergence.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum EdgeResponse {
-    /// The same wherever the track leads \[s\].
+    /// The same in all directions of the track \[s\].
     Given(f64),
-    /// By [`response_time`] of the direction across the track.
+    /// By [`response_time`], from the direction across the track.
     Waves {
-        /// Of Bragg waves that run across the track \[s\].
+        /// Response time of Bragg waves that run across the track \[s\].
         bragg: f64,
-        /// Share of σ⁰ from breaking waves, and their response \[s\].
+        /// Share of σ⁰ from breaking waves, and their response time \[s\].
         breaking: [f64; 2],
     },
 }
 
 impl EdgeResponse {
-    /// `T_e` \[s\] where the unit vector to port has the component `across` along the look direction.
+    /// `T_e` \[s\] for a unit vector to port with the component `across` along the look direction.
     #[must_use]
     pub fn at(&self, across: f64) -> f64 {
         match *self {
@@ -131,8 +131,8 @@ impl EdgeResponse {
 }
 
 impl WakeEdge {
-    /// Factor on σ⁰ at ξ forward of midship and η to port \[m\]; 1 ahead of the bow, beginning along the hull as the
-    /// Kelvin wake does ([`fade`]).
+    /// Factor on σ⁰ at ξ forward of midship and η to port \[m\]; 1 ahead of the bow, setting in along the hull like the Kelvin
+    /// wake ([`fade`]).
     #[must_use]
     pub fn factor(&self, seen: [f64; 2]) -> f64 {
         let [forward, port] = seen;
@@ -141,7 +141,7 @@ impl WakeEdge {
         edge_factor(divergence, self.response.at(across)).powf(fade(forward, self.length))
     }
 
-    /// The current at ξ of the track, and the component of the unit vector to port along the look direction there.
+    /// Current at ξ of the track, and the component of the unit vector to port along the look direction there.
     fn there(&self, forward: f64) -> (WakeCurrent, f64) {
         if self.track.turn().is_none() {
             return (self.current, self.track.port()[0]);
@@ -155,13 +155,13 @@ impl WakeEdge {
         (current, x)
     }
 
-    /// Velocity to port there [m/s].
+    /// Velocity to port at a place seen from the ship [m/s].
     pub(crate) fn velocity(&self, [forward, port]: [f64; 2]) -> f64 {
         let (current, _) = self.there(forward);
         current.velocity(self.astern(forward), port) * fade(forward, self.length)
     }
 
-    /// Divergence of the current there [1/s].
+    /// Divergence of the current at a place seen from the ship [1/s].
     pub(crate) fn divergence(&self, [forward, port]: [f64; 2]) -> f64 {
         let (current, _) = self.there(forward);
         current.divergence(self.astern(forward), port) * fade(forward, self.length)
@@ -172,7 +172,7 @@ impl WakeEdge {
         (-forward - 0.5 * self.length).max(0.0)
     }
 
-    /// Multiplies σ⁰ with the factor, as far as [`Self::factor`] differs from 1 by more than 2e-8 of its largest change.
+    /// Multiplies σ⁰ by the factor wherever [`Self::factor`] differs from 1 by more than 2e-8 of its largest change.
     ///
     /// # Panics
     ///
@@ -183,7 +183,7 @@ impl WakeEdge {
         });
     }
 
-    /// Adds the current to the velocities of the water along x and y [m/s]; a field without pixels stays so.
+    /// Adds the current to the velocities of the water along x and y [m/s]; a field without pixels is left as it is.
     pub(crate) fn add_velocity(&self, along: [&mut Field; 2], raster: &Raster) {
         for (axis, field) in along.into_iter().enumerate() {
             if field.values.is_empty() {
@@ -199,7 +199,7 @@ impl WakeEdge {
         }
     }
 
-    /// Changes the pixels near the track, each seen from the ship.
+    /// Changes the pixels near the track, by their places as seen from the ship.
     fn change(
         &self,
         field: &mut Field,
@@ -225,7 +225,7 @@ impl WakeEdge {
 /// exp(clip(−T_e div, ±1.2))
 /// ```
 ///
-/// the steady response to a current of waves that relax in a time much shorter than that in which the wake changes.
+/// This is the steady response to a current of waves that relax in a time much shorter than that in which the wake changes.
 ///
 /// - `response` `T_e` \[s\], see [`response_time`]
 #[must_use]
@@ -235,14 +235,15 @@ pub fn edge_factor(divergence: f64, response: f64) -> f64 {
         .exp()
 }
 
-/// Response `T_e` \[s\] of σ⁰ to a divergence: Bragg waves along the look direction, breaking waves whatever theirs.
+/// Response time `T_e` \[s\] of σ⁰ to a divergence: Bragg waves respond along the look direction, breaking waves in any
+/// direction.
 ///
 /// ```text
 /// T_e = (1 − p) m_B cos²χ/μ_B + p T_b,     at most 1000 s
 /// ```
 ///
 /// - `bragg`: `m_B`/`μ_B` \[s\], strength of the modulation over the relaxation rate
-/// - `across`: cos χ, of the angle from the look direction to the direction across the track
+/// - `across`: cos χ, χ the angle from the look direction to the direction across the track
 /// - `breaking`: p, share of σ⁰ from breaking waves; `breaking_response`: `T_b` \[s\], see
 ///   [`crate::scattering::breaking::response_time`]
 #[must_use]
@@ -300,7 +301,7 @@ mod tests {
         }
     }
 
-    /// 1 km behind a ship of 7.2 m/s, 4 m/s of wind across, a response of 950 s: twice as bright as the sea.
+    /// 1 km behind a ship of 7.2 m/s, with 4 m/s of wind across and a response of 950 s, the edge is twice as bright as the sea.
     #[test]
     fn the_windward_edge_is_bright() {
         let current = WakeCurrent::of_wind(7.2, 26.0, 0.0, -4.0);
@@ -328,8 +329,8 @@ mod tests {
         }
     }
 
-    /// The waves that ride along relax as n' = −μ n − m div(t); the factor takes the steady n = −m div/μ. Against the
-    /// integral over the age t by quadrature: what lags behind is (d ln div/dt)/μ to first order.
+    /// Waves carried along with the wake relax as n' = −μ n − m div(t); the factor uses the steady n = −m div/μ. Compared with
+    /// the integral over the age t by quadrature, the lag is (d ln div/dt)/μ to first order.
     #[test]
     fn the_steady_response_is_that_of_the_relaxation() {
         let current = WakeCurrent {
@@ -360,7 +361,7 @@ mod tests {
         }
     }
 
-    /// No water is made: the divergence sums to nothing across the wake.
+    /// Water is conserved: the divergence sums to zero across the wake.
     #[test]
     fn water_is_conserved() {
         let wake = wake();

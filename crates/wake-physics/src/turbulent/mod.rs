@@ -9,16 +9,16 @@
 //!
 //! Every constant below carries its source or the word "chosen".
 //!
-//! In a wind the damped waves are restored at their relaxation rate μ. With a rate γ at which the turbulence damps them, the
-//! balance 0 = μ (N₀ − N) − γ N of their action leaves
+//! In a wind, the damped waves recover at their relaxation rate μ. With γ the rate at which the turbulence damps them, the
+//! balance 0 = μ (N₀ − N) − γ N of their action gives
 //!
 //! ```text
 //! D = γ/(μ + γ) = r/(1 + r),     r = γ/μ = r₅ (u*(5 m/s)/u*)² e^{−d/(U T)},     T = 600 s
 //! ```
 //!
-//! since μ = 0.04 (u*/c)² ω (Plant 1982), the same power of u* for all Bragg waves ([`Suppression::Balance`]). So a stronger wind
-//! lowers the damping and shortens the dark line. T is the median time for which the bubbles and the turbulence of 38 ships could
-//! be observed, about 10 minutes, some more than 20 (Nylund, Arneborg, Tengberg, Mallast and Hassellöv 2021, Ocean Sci. 17, 1285).
+//! since μ = 0.04 (u*/c)² ω (Plant 1982) has the same power of u* for all Bragg waves ([`Suppression::Balance`]). A stronger wind
+//! thus lowers the damping and shortens the dark line. T is the median time for which bubbles and turbulence of 38 ships could be
+//! observed, about 10 minutes, some more than 20 (Nylund, Arneborg, Tengberg, Mallast and Hassellöv 2021, Ocean Sci. 17, 1285).
 
 pub mod current;
 
@@ -31,18 +31,18 @@ use rayon::prelude::*;
 /// Damping on the centreline at the stern, D(0) = 0.6, that is −4 dB: chosen.
 pub const STERN_DAMPING: f64 = 0.6;
 
-/// Time T in which the turbulence that damps falls to 1/e where the wind restores the waves \[s\]: see the module's page.
+/// Time T in which the damping turbulence falls to 1/e where the wind restores the waves \[s\]: see the module's documentation.
 pub const TURBULENCE_TIME: f64 = 600.0;
 
-/// Wind at which the damping of a ship is given where the wind restores the waves [m/s]: chosen.
+/// Wind at which a ship's damping is given, where the wind restores the waves [m/s]: chosen.
 pub const REFERENCE_WIND: f64 = 5.0;
 
-/// Time in which the damping falls to 1/e, 1000 s: chosen, so that 5 % is left 28 km behind a ship of 10 m/s.
-/// Dark centrelines have been seen up to 41 km (Shemdin 1990, J. Geophys. Res. 95).
+/// Time in which the damping falls to 1/e, 1000 s: chosen, so that 6 % is left 28 km behind a ship of 10 m/s. Dark centrelines
+/// have been seen up to 41 km (Shemdin 1990, J. Geophys. Res. 95).
 pub const RECOVERY_TIME: f64 = 1000.0;
 
-/// Factor of the width law W = w B^{4/5} x^{1/5}, w⁵ = 4: chosen, of the size used with Milgram et al. (1993),
-/// J. Geophys. Res. 98, who found the power 1/5.
+/// Factor of the width law W = w B^{4/5} x^{1/5}, w⁵ = 4: chosen, of the size used with Milgram et al. (1993), J. Geophys. Res.
+/// 98, who found the power 1/5.
 const WIDTH_FACTOR: f64 = 4.0;
 
 /// Full width W of the wake \[m\]: twice the distance off the track at which the damping falls to e^{−1/2}.
@@ -51,10 +51,10 @@ const WIDTH_FACTOR: f64 = 4.0;
 /// W(d) = B (1 + 4 d/B)^{1/5}
 /// ```
 ///
-/// the law W ∝ x^{1/5} of Milgram et al. (1993), begun so that the wake is as wide as the ship at the stern.
+/// The law W ∝ x^{1/5} of Milgram et al. (1993), shifted so that the wake is as wide as the ship at the stern.
 ///
 /// - `beam` B \[m\], above 0
-/// - `distance` d astern of the stern \[m\]; B where negative
+/// - `distance` d astern of the stern \[m\]; W is B where it is negative
 #[must_use]
 pub fn width(beam: f64, distance: f64) -> f64 {
     beam * (1.0 + WIDTH_FACTOR * distance.max(0.0) / beam).powf(0.2)
@@ -66,12 +66,12 @@ pub fn width(beam: f64, distance: f64) -> f64 {
 pub enum Suppression {
     /// The damping D(0) at the stern \[1\], in every wind: D(d) = D(0) exp(−d/(U · 1000 s)).
     Given(f64),
-    /// The ratio r(0) at the stern of the rates of damping and of recovery \[1\], see the module's page.
+    /// The ratio r(0) at the stern of the rates of damping and of recovery \[1\], see the module's documentation.
     Balance(f64),
 }
 
 impl Suppression {
-    /// The balance in a wind, by the damping in the reference wind.
+    /// Balance in a wind, from the damping in the reference wind.
     ///
     /// - `damping` D in 5 m/s \[1\], 0 to 1; at 1 nothing is restored
     /// - `wind_speed` at 10 m [m/s]; without wind nothing is restored
@@ -121,8 +121,8 @@ pub struct TurbulentWake {
 }
 
 impl TurbulentWake {
-    /// Damping of the Bragg spectrum \[1\] at ξ forward of midship and η to port \[m\]: 0 ahead of the bow, rising
-    /// smoothly along the hull as the Kelvin wake does ([`fade`]).
+    /// Damping of the Bragg spectrum \[1\] at ξ forward of midship and η to port \[m\]: 0 ahead of the bow, rising smoothly along
+    /// the hull like the Kelvin wake ([`fade`]).
     #[must_use]
     pub fn damping(&self, [forward, port]: [f64; 2]) -> f64 {
         let distance = (-forward - 0.5 * self.length).max(0.0);
@@ -131,7 +131,7 @@ impl TurbulentWake {
         centre * (-0.5 * off * off).exp() * fade(forward, self.length)
     }
 
-    /// Fills a field of the raster's size with [`Self::damping`]; the Bragg spectrum is multiplied by 1 − it.
+    /// Fills a field of the raster's size with [`Self::damping`]; the Bragg spectrum is multiplied by 1 minus the field.
     pub(crate) fn fill_damping(&self, field: &mut Field, raster: &Raster) {
         let farthest = self.track.farthest_astern(raster);
         // Six standard deviations: exp(−18) ≈ 1.5e-8 lies below the rounding of 1 − damping in f32.
@@ -177,8 +177,8 @@ mod tests {
         assert_eq!(crate::scene::Ship::default().damping, STERN_DAMPING);
     }
 
-    /// In 5 m/s the damping is the given one. By Wu's drag (0.8 + 0.065 U) 10⁻³, u*² is 0.00372, 0.02812, 0.145 and 0.2275 m²/s² in
-    /// 2, 5, 10 and 12 m/s: a ratio of 1.5 in 5 m/s is 11.34, 0.2909 and 0.1854 in the others.
+    /// In 5 m/s the damping is the given one. By Wu's drag (0.8 + 0.065 U) 10⁻³, u*² is 0.00372, 0.02812, 0.145 and 0.2275 m²/s²
+    /// in 2, 5, 10 and 12 m/s: a ratio of 1.5 in 5 m/s becomes 11.34, 0.2909 and 0.1854 in the other winds.
     #[test]
     fn the_wind_restores_the_waves() {
         for (wind, damping) in [

@@ -1,11 +1,11 @@
-//! The strong baseline: the sum of plane waves as one dense matrix product.
+//! Strong baseline: the sum of plane waves as one dense matrix product.
 //!
 //! ```text
 //! f[i, j] = Σₙ Re[sₙ e^{iky yᵢ} · e^{ikx xⱼ}] = Σₙ (Re Yᵢₙ Re Xₙⱼ − Im Yᵢₙ Im Xₙⱼ)
 //! ```
 //!
-//! Sines and cosines are taken on the rows and on the columns only; the rest is a real product with the inner
-//! length 2·waves, blocked for the caches and for the registers.
+//! Sines and cosines are evaluated on the rows and columns only; the rest is a real matrix product with inner length
+//! 2·waves, blocked for caches and registers.
 
 use super::{PlaneWaves, Quantity, Transfer, strengths};
 use crate::raster::{Field, Raster};
@@ -16,16 +16,16 @@ use rayon::prelude::*;
 /// Rows of a register tile; its columns are two vectors.
 const TILE: usize = 6;
 
-/// Rows of a block: the left factor of a block stays in the second cache.
+/// Rows of a block: its left factor stays in the L2 cache.
 const ROWS: usize = 8 * TILE;
 
-/// Waves of a block: a tile of the right factor stays in the first cache.
+/// Waves of a block: a tile of the right factor stays in the L1 cache.
 const WAVES: usize = 128;
 
-/// Sums plane waves on a raster as a matrix product, in `f32`, one field a quantity.
+/// Sums plane waves on a raster as a matrix product, in `f32`, one field per quantity.
 ///
-/// The same sum as [`harmonic_sum`](super::harmonic_sum) in waves × pixels multiplications. Its error is that
-/// of `f32` sums, about 1e-6 of a field's rms for some thousand waves of unrelated phases.
+/// The same sum as [`harmonic_sum`](super::harmonic_sum), in waves × pixels multiplications. Its error is that of `f32`
+/// sums, about 1e-6 of a field's rms for a few thousand waves with unrelated phases.
 #[must_use]
 pub fn matrix_product(
     waves: &PlaneWaves,
@@ -60,7 +60,7 @@ pub fn matrix_product(
         .collect()
 }
 
-/// Packs e^{ikx x}: for every block of waves and every tile of columns, (Re, −Im) rows of the tile's width.
+/// Packed e^{ikx x}: for every block of waves and every tile of columns, (Re, −Im) rows of the tile's width.
 struct PackRight<'a> {
     waves: &'a PlaneWaves,
     raster: &'a Raster,
@@ -185,7 +185,7 @@ mod tests {
     use super::super::harmonic_sum;
     use super::*;
 
-    /// The sum of 300 waves on rasters that are no multiple of any tile, against the harmonic sum.
+    /// The sum of 300 waves on rasters whose sizes are not multiples of a tile, against the harmonic sum.
     #[test]
     fn product_is_the_harmonic_sum() {
         let transfer = Transfer {
@@ -210,8 +210,8 @@ mod tests {
             let fields = matrix_product(&waves, &transfer, &quantities, &raster);
             for (field, exact) in fields.iter().zip(exact) {
                 for (v, e) in field.values.iter().zip(exact) {
-                    // Waves of strength 2 at most, rms 24: 600 products rounded to f32, errors adding up at
-                    // random to 600^½ · 6e-8 · 24 = 4e-5; three times that.
+                    // Waves of strength at most 2, rms 24: 600 products rounded to f32, with random errors adding up to
+                    // 600^½ · 6e-8 · 24 = 4e-5; three times that.
                     assert!((f64::from(*v) - e).abs() < 1.2e-4);
                 }
             }

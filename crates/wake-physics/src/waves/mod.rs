@@ -1,4 +1,4 @@
-//! Plane waves, their fields, and the slow harmonic sum that fast sums are compared with.
+//! Plane waves, their fields, and the slow harmonic sum that serves as reference for fast sums.
 
 pub(crate) mod matrix_product;
 
@@ -31,7 +31,7 @@ pub struct PlaneWaves {
 }
 
 impl PlaneWaves {
-    /// No wave, and room for as many.
+    /// No waves, with capacity for `count`.
     pub(crate) fn with_capacity(count: usize) -> Self {
         Self {
             kx: Vec::with_capacity(count),
@@ -41,7 +41,7 @@ impl PlaneWaves {
         }
     }
 
-    /// Some of the waves, in their order.
+    /// Some of the waves, in order.
     pub(crate) fn part(&self, range: Range<usize>) -> Self {
         Self {
             kx: self.kx[range.clone()].to_vec(),
@@ -71,7 +71,7 @@ impl PlaneWaves {
         self.amplitude.push(amplitude);
     }
 
-    /// The `count` waves of largest |a|, in their old order.
+    /// The `count` waves of largest |a|, in their original order.
     #[must_use]
     pub fn strongest(&self, count: usize) -> Self {
         let mut order: Vec<usize> = (0..self.len()).collect();
@@ -103,7 +103,7 @@ pub enum Quantity {
     VelocityX,
     /// Velocity of the water at the surface along y [m/s].
     VelocityY,
-    /// Velocity of the water at the surface upward [m/s].
+    /// Upward velocity of the water at the surface [m/s].
     VelocityZ,
     /// Acceleration toward the radar [m/s²].
     RadialAcceleration,
@@ -111,7 +111,7 @@ pub enum Quantity {
     Hydrodynamic,
 }
 
-/// Turns the amplitude of a wave into the amplitude of any [`Quantity`].
+/// Conversion from a wave's amplitude to the amplitude of any [`Quantity`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Transfer {
     /// Water depth h \[m\], may be infinite.
@@ -124,9 +124,9 @@ pub struct Transfer {
     pub action_slope: f64,
 }
 
-/// Waves shorter than 5 m do not modulate the Bragg waves (chosen): above the relaxation rate the modulation is `m_B`
-/// times the steepness of the wave whatever its length, so that without an end its variance would follow the grid.
-/// Largest wavenumber that modulates [rad/m], with 1e-4 more so that rounding does not decide on 5 m itself.
+/// Largest wavenumber that modulates the Bragg waves [rad/m]: waves shorter than 5 m do not (chosen). Above the relaxation
+/// rate the modulation is `m_B` times the wave's steepness at any length, so its variance would otherwise depend on the
+/// grid. The additional 1e-4 keeps rounding from deciding on 5 m itself.
 pub(crate) const LARGEST_MODULATING_WAVENUMBER: f64 = std::f64::consts::TAU / 5.0 * 1.0001;
 
 impl Transfer {
@@ -142,7 +142,7 @@ impl Transfer {
     /// The water under a crest moves along +k. The last line is the relaxation model
     /// ∂m/∂t + μ m = −`m_B` ∂vx/∂x for Bragg waves along the line of sight.
     ///
-    /// - `kx`, `ky` [rad/m], not both 0 (there T is 0 but for the elevation)
+    /// - `kx`, `ky` [rad/m], not both 0 (there T is 0 except for the elevation)
     /// - `omega` ω [rad/s]
     ///
     /// # References
@@ -170,7 +170,7 @@ impl Transfer {
         }
     }
 
-    /// Modulation by a wave of any length, which [`Self::factor`] ends at 5 m [1/m].
+    /// Modulation by a wave of any length [1/m]; [`Self::factor`] ends at 5 m.
     pub(crate) fn modulation(&self, [kx, ky]: [f64; 2], omega: f64) -> Complex64 {
         let k = kx.hypot(ky);
         let horizontal = omega / crate::dispersion::depth_factor(k, self.depth);
@@ -186,9 +186,9 @@ impl Transfer {
     }
 }
 
-/// Sums plane waves pixel by pixel: slow, the oracle of every fast sum.
+/// Sums plane waves pixel by pixel: slow, the reference for every fast sum.
 ///
-/// `pixels` are (row, column) pairs. The cost is waves × pixels sines and cosines, once for all quantities.
+/// `pixels` are (row, column) pairs. The cost is waves × pixels sines and cosines, shared by all quantities.
 ///
 /// # Shapes
 ///
@@ -279,7 +279,7 @@ mod tests {
         (TRANSFER.factor(quantity, k, omega) * Complex64::cis(phase)).re
     }
 
-    /// Slopes, vertical velocity and acceleration against differences of elevation and velocity.
+    /// Slopes, vertical velocity and acceleration against finite differences of elevation and velocity.
     #[test]
     fn factors_are_derivatives() {
         let (k, p, d) = ([0.21, -0.13], [3.0, -4.0, 5.0], 1e-4);

@@ -1,4 +1,4 @@
-"""Ship wakes in radar (SAR) images: simulated by physics, drawn from sentences by a small model, found by a small detector.
+"""Ship wakes in radar (SAR) images: physical simulation, generation from sentences, and detection.
 
 >>> import shipwake
 >>> scene = shipwake.Scene(ship={"speed": 8}, sea={"wind_speed": 3}, grid={"rows": 128, "columns": 128})
@@ -7,10 +7,10 @@
 (128, 128)
 
 Numbers are in SI units, angles in degrees. x is ground range, away from the radar; y is azimuth, along the flight.
-Directions are clockwise from azimuth and say where a thing goes to.
+Directions are clockwise from azimuth, and those toward which ships, wind and waves move.
 
-Long calls release the interpreter's lock and work on a pool of threads of their own (``threads=``). The package may be used
-after ``fork`` and ``spawn``.
+Long calls release the interpreter's lock and run on a thread pool of the package (``threads=``). The package works after
+``fork`` and ``spawn``.
 """
 
 from . import errors

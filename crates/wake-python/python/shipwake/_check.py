@@ -1,4 +1,4 @@
-"""Checks of arguments, with errors of this package."""
+"""Checks of arguments, which raise errors of this package."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LARGEST_SEED = 2**64 - 1
 
 
 def whole(name: str, value: Any, least: int, most: int) -> int:
-    """A whole number from ``least`` to ``most``."""
+    """Returns a whole number from ``least`` to ``most``."""
     try:
         number = operator.index(value)
     except TypeError:
@@ -26,12 +26,12 @@ def whole(name: str, value: Any, least: int, most: int) -> int:
 
 
 def threads(value: Any) -> int | None:
-    """A number of threads, or ``None`` for one a core."""
+    """Returns a number of threads, or ``None`` for one per core."""
     return None if value is None else whole("threads", value, 1, 1024)
 
 
 def number(name: str, value: Any, least: float, most: float) -> float:
-    """A number from ``least`` to ``most``; NaN lies outside."""
+    """Returns a number from ``least`` to ``most``; NaN lies outside."""
     try:
         result = float(value)
     except (TypeError, ValueError, OverflowError):
@@ -42,7 +42,7 @@ def number(name: str, value: Any, least: float, most: float) -> float:
 
 
 def text(name: str, value: Any) -> str:
-    """Text that has a form in UTF-8."""
+    """Returns text that can be encoded as UTF-8."""
     if not isinstance(value, str):
         raise OptionError(f"{name} is {value!r:.80}, expected text")
     try:
@@ -53,7 +53,7 @@ def text(name: str, value: Any) -> str:
 
 
 def path(name: str, value: Any) -> str:
-    """A path of the file system, as text."""
+    """Returns a path of the file system as text."""
     try:
         found = os.fspath(value)
     except TypeError:
@@ -65,7 +65,7 @@ def path(name: str, value: Any) -> str:
 
 
 def array(name: str, value: Any, dimensions: int, dtype: npt.DTypeLike) -> npt.NDArray[Any]:
-    """Real numbers as an array of ``dtype``, in the order of C; not copied where it is one already."""
+    """Returns real numbers as a C-contiguous array of ``dtype``, without a copy if they are one already."""
     try:
         found = np.asarray(value)
     except (TypeError, ValueError) as error:
@@ -75,7 +75,7 @@ def array(name: str, value: Any, dimensions: int, dtype: npt.DTypeLike) -> npt.N
     if found.ndim != dimensions:
         shape = " x ".join(map(str, found.shape)) or "no dimension"
         raise ArrayError(f"{name} has the shape {shape}, expected {dimensions} dimensions")
-    # Numbers too large for `dtype` become infinite, and are refused or left out where they are used.
+    # Numbers too large for `dtype` become infinite, and are refused or ignored where they are used.
     try:
         with np.errstate(over="ignore"):
             return np.ascontiguousarray(found, dtype=dtype)

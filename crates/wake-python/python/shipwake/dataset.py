@@ -1,4 +1,4 @@
-"""Data sets of simulated images with labels: by index, batch by batch, and as folders."""
+"""Data sets of simulated images with labels: by index, in batches, and as folders."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _LONGEST_RECIPE = 1 << 20
 
 
 class Item(TypedDict):
-    """One image of a data set, with everything that is known of it.
+    """One image of a data set, with its labels and scene.
 
     Boxes count from the corner of the first pixel, as in COCO and YOLO files.
     """
@@ -46,15 +46,15 @@ class Item(TypedDict):
     classes: npt.NDArray[np.int64]
     """``[objects]``: 0 for a wake, 1 for a ship."""
     labels: Labels
-    """All labels; they count from the centre of the first pixel, half a pixel beside the boxes."""
+    """All labels. Their pixels count from the centre of the first pixel, half a pixel from the origin of the boxes."""
     scene: Scene
     """The scene that made the image."""
     amplitudes: tuple[float, float] | None
-    """Of a recipe that draws quick-looks: amplitudes of grey 0 and grey 1."""
+    """Amplitudes of grey 0 and grey 1, for recipes with quick-looks; else ``None``."""
 
 
 class Batch(TypedDict):
-    """Some images of a data set, see :class:`Item`."""
+    """Several images of a data set, see :class:`Item`."""
 
     index: npt.NDArray[np.int64]
     """``[images]``: numbers of the images."""
@@ -70,9 +70,9 @@ class Batch(TypedDict):
 
 
 class Dataset:
-    """Simulated images with labels: a map-style data set for torch, and a folder when you need one.
+    """Simulated images with labels: a map-style data set for torch, which can also be written to a folder.
 
-    Image i is a function of recipe, seed and i alone: any number of workers, threads or machines makes the same images.
+    Image i depends only on recipe, seed and i, not on the number of workers, threads or machines.
 
     >>> from shipwake import Dataset
     >>> data = Dataset("ranges", seed=7, count=10, changes={"scene.grid.rows": 32, "scene.grid.columns": 32})
@@ -89,15 +89,15 @@ class Dataset:
         loader = DataLoader(data, batch_size=16, num_workers=2, collate_fn=collate)
 
     Args:
-        recipe: ``"paper"``, ``"ranges"``, ``"detector"`` or ``"model"``, a path of a recipe file, or its tables as a
+        recipe: ``"paper"``, ``"ranges"``, ``"detector"`` or ``"model"``, the path of a recipe file, or its tables as a
             dictionary.
-        seed: Seed of the whole set, 0 to 2**64 - 1.
+        seed: Seed of the data set, 0 to 2**64 - 1.
         count: Number of images; by default 100, and 3456 for the recipe ``"paper"``.
-        changes: Other values by keys of the recipe, such as ``{"scene.grid.rows": 128, "speckle": True}``.
-        threads: Number of threads that make an image or a batch; by default one a core, and one in a worker of torch.
+        changes: Values that replace those of the recipe, by key, such as ``{"scene.grid.rows": 128, "speckle": True}``.
+        threads: Number of threads that make an image or a batch; by default one per core, and one in a worker of torch.
 
     Raises:
-        RecipeError: A recipe that is not understood.
+        RecipeError: An invalid recipe.
         SceneError: A value out of its range.
         FileError: A recipe file that cannot be read.
     """
@@ -136,12 +136,12 @@ class Dataset:
 
     @property
     def recipe(self) -> str:
-        """The whole recipe as text."""
+        """The whole recipe, as the text of a recipe file."""
         return self._inner.to_toml()
 
     @property
     def seed(self) -> int:
-        """Seed of the whole set."""
+        """Seed of the data set."""
         return self._inner.seed()
 
     @property
@@ -153,40 +153,40 @@ class Dataset:
         return self._count
 
     def __getitem__(self, index: int) -> Item:
-        """Image number ``index`` with its labels; a negative one counts from the end."""
+        """Returns image number ``index`` with its labels; negative numbers count from the end."""
         return _item(self._inner.pair(self._position(index), self._pool()))
 
     def __iter__(self) -> Iterator[Item]:
         return (self[index] for index in range(self._count))
 
     def scene(self, index: int) -> Scene:
-        """The scene of image number ``index``, without making it."""
+        """Returns the scene of image number ``index`` without simulating the image."""
         return Scene._of(self._inner.scene(self._position(index)))
 
     def without_image(self, index: int) -> Item:
-        """As ``dataset[index]``, with an image of no pixels: it is not simulated."""
+        """Returns ``dataset[index]`` without simulating the image, which has no pixels."""
         return _item(self._inner.without_image(self._position(index)))
 
     def files(self, index: int) -> dict[str, bytes]:
-        """Image number ``index`` as the files of a WebDataset sample, as ``wake dataset --webdataset`` has them.
+        """Returns image number ``index`` as the files of a WebDataset sample, as in ``wake dataset --webdataset``.
 
-        ``png`` is the image of 8 bits, ``txt`` the prompt, ``json`` the line of ``metadata.jsonl``: labels, values, scene.
+        ``png`` is the 8-bit image, ``txt`` the prompt, ``json`` the line of ``metadata.jsonl``: labels, values, scene.
         """
         return self._inner.files(self._position(index), self._pool())
 
     def batches(self, size: int, *, start: int = 0) -> Iterator[Batch]:
-        """The images in order, ``size`` at a time; the last batch may be smaller.
+        """Yields the images in order, ``size`` at a time; the last batch may be smaller.
 
         Args:
-            size: Images of a batch.
-            start: Number of the first batch, to go on where a run was stopped.
+            size: Images per batch.
+            start: Number of the first batch, to resume a run that was stopped.
         """
         size = _check.whole("size", size, 1, 10**6)
         start = _check.whole("start", start, 0, 10**12)
         return (self.batch(step, size) for step in range(start, -(-self._count // size)))
 
     def batch(self, step: int, size: int) -> Batch:
-        """Batch number ``step`` of ``size`` images."""
+        """Returns batch number ``step`` of ``size`` images."""
         first = _check.whole("step", step, 0, 10**12) * _check.whole("size", size, 1, 10**6)
         if first >= self._count:
             raise IndexError(f"batch {step} of {size} images begins after the last of {self._count} images")
@@ -212,19 +212,19 @@ class Dataset:
         threads: int | None = None,
         progress: Callable[[int, int], object] | None = None,
     ) -> int:
-        """Writes the set into a folder as ``wake dataset`` does: PNG, YOLO, YOLO-OBB, DOTA, COCO, and prompts.
+        """Writes the data set into a folder as ``wake dataset`` does: PNG, YOLO, YOLO-OBB, DOTA, COCO, and prompts.
 
-        A run that was stopped goes on where it was. The bytes depend on recipe, seed, count and ``val_share`` alone.
+        A call after a run that was stopped resumes it. The bytes depend only on recipe, seed, count and ``val_share``.
 
         Args:
-            folder: The folder, made if absent; of a shard ``folder/shard-i``, see :func:`merge_shards`.
-            val_share: Share of the images that are for validation, 0 to 1.
+            folder: The folder, made if absent; a shard is written to ``folder/shard-i``, see :func:`merge_shards`.
+            val_share: Share of the images for validation, 0 to 1.
             shard: ``(i, n)`` writes share i of n, counted from 0.
-            threads: Images made at the same time, by default one a core.
+            threads: Number of images made at the same time, by default one per core.
             progress: Called as ``progress(done, total)``.
 
         Returns:
-            Number of images that were made.
+            Number of images made by this call.
 
         Raises:
             DatasetError: A folder that holds something else, or a damaged file.
@@ -245,10 +245,10 @@ class Dataset:
         )
 
     def to_hf(self) -> datasets.Dataset:
-        """The set as a :class:`datasets.Dataset` in memory, with the columns ``image``, ``text``, ``objects`` and ``scene``.
+        """Returns the data set as a :class:`datasets.Dataset` in memory.
 
-        Needs the package ``datasets``. For sets that do not fit in memory use :meth:`write` and
-        ``datasets.load_dataset("imagefolder", data_dir=folder)``.
+        Its columns are ``image``, ``text``, ``objects`` and ``scene``. Needs the package ``datasets``. For data sets that do not
+        fit in memory use :meth:`write` and ``datasets.load_dataset("imagefolder", data_dir=folder)``.
         """
         import datasets
 
@@ -293,7 +293,7 @@ class Dataset:
         return self._threads
 
     def _on(self, threads: int) -> Dataset:
-        """The same data set, made by so many threads."""
+        """Returns the same data set, made by ``threads`` threads."""
         source, seed, count, values, _ = self._arguments
         return _again(source, seed, count, values, threads)
 
@@ -306,31 +306,31 @@ class Dataset:
 
 
 def merge_shards(folder: Any) -> int:
-    """Joins the shards of a folder into the set that one run would have written, byte for byte.
+    """Joins the shards of a folder into the data set that one run would have written, byte for byte.
 
     Returns:
         Number of images.
 
     Raises:
-        DatasetError: A shard that is missing, not finished, or of another set.
+        DatasetError: A shard that is missing, unfinished, or of another data set.
     """
     return _core.merge_shards(_check.path("folder", folder))
 
 
 def png(image: npt.NDArray[np.float32]) -> bytes:
-    """An image of grey 0 to 1 as the bytes of a PNG file of 8 bits."""
+    """Encodes an image of grey 0 to 1 as the bytes of an 8-bit PNG file."""
     grey = np.asarray(image, dtype=np.float32).reshape(image.shape[-2:])
     return _core.png(np.floor(255.0 * grey + 0.5).astype(np.uint8))
 
 
 class _Text(str):
-    """The text of a recipe file, where a name stands otherwise."""
+    """Text of a recipe file, to tell it from the name of a recipe."""
 
 
 def _again(
     source: str | dict[str, Any], seed: int, count: int, values: dict[str, Any], threads: int | None
 ) -> Dataset:
-    """The same data set in another process, without the file of its recipe."""
+    """Restores a data set in another process, without its recipe file."""
     dataset = Dataset.__new__(Dataset)
     dataset._arguments = (source, seed, count, values, threads)
     dataset._inner, dataset._count, dataset._threads = _simulated(source, values, seed), count, threads
@@ -380,6 +380,6 @@ def _shard(shard: Any) -> tuple[int, int]:
 
 
 def _is_worker() -> bool:
-    """Whether this process is a worker of torch's loader, of which there is one a core already."""
+    """Whether this process is a worker of torch's loader, of which there is usually one per core."""
     data = sys.modules.get("torch.utils.data")
     return data is not None and data.get_worker_info() is not None

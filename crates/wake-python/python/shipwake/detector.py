@@ -1,4 +1,4 @@
-"""Wakes in images, found by a small network whose weights come with the package."""
+"""Detection of wakes in images, by a small network whose weights come with the package."""
 
 from __future__ import annotations
 
@@ -15,46 +15,46 @@ from .product import Product
 __all__ = ["LEAST_SCORE", "Detection", "Detector"]
 
 LEAST_SCORE = 0.03
-"""Wakes of a lower score are left out, unless they are asked for."""
+"""Default least score: wakes with lower scores are not reported."""
 
 
 @dataclass(frozen=True, eq=False)
 class Detection:
-    """A wake that was found. Pixels are (column, row), whole numbers at the centres of pixels."""
+    """A detected wake. Pixels are (column, row), with whole numbers at the centres of pixels."""
 
     score: float
-    """How sure the detector is, 0 to 1: an order, not a probability."""
+    """Score, 0 to 1: a ranking, not a probability."""
     probability: float | None
-    """Probability of a wake, in either direction; ``None`` for weights without a calibration."""
+    """Probability that there is a wake, in either direction; ``None`` for weights without a calibration."""
     direction_probability: float | None
-    """Probability that tip and end are not taken for each other, if it is a wake; ``None`` for weights without a calibration, and
-    where the score is 0."""
+    """Probability that tip and end are not swapped, if it is a wake; ``None`` for weights without a calibration, and where
+    the score is 0."""
     sure: bool
-    """Whether it counts as found: the score is at least that of the calibration, 0.25 without one."""
+    """Whether the wake counts as found: its score is at least that of the calibration, or 0.25 without a calibration."""
     tip: tuple[float, float]
-    """Where the wake begins [pixels]."""
+    """Start of the wake [pixels]."""
     axis_deg: float
-    """From the tip along the wake, clockwise from the top of the image [degrees]."""
+    """Direction from the tip along the wake, clockwise from the top of the image [degrees]."""
     half_angle_deg: float
     """Half the angle between the outer edges [degrees]."""
     length: float
     """Visible length [pixels]."""
     length_sd: float | None
-    """Standard deviation of the length [pixels]; ``None`` where the surroundings of the line do not lie in the image."""
+    """Standard deviation of the length [pixels]; ``None`` where the surroundings of the line lie outside the image."""
     corners: npt.NDArray[np.float64]
     """``[4, 2]``: corners of the box along the wake, left and right of the tip first."""
 
     @property
     def heading_deg(self) -> float:
-        """Direction of the ship, clockwise from the top of the image, 0 to 360 [degrees]."""
+        """Heading of the ship, clockwise from the top of the image, 0 to 360 [degrees]."""
         return (self.axis_deg + 180.0) % 360.0
 
 
 class Detector:
     """Finds ship wakes in radar images.
 
-    Grey may have any scaling: the network reads contrast in standard deviations of the speckle around. Calls return unsure
-    wakes, too; :attr:`Detection.sure` says which count as found.
+    Grey may have any scaling: the network measures contrast in standard deviations of the surrounding speckle. Calls also
+    return uncertain wakes; :attr:`Detection.sure` marks the wakes that count as found.
 
     >>> import numpy as np
     >>> from shipwake import Detector
@@ -73,16 +73,16 @@ class Detector:
 
     @classmethod
     def pretrained(cls) -> Detector:
-        """The network of this package."""
+        """Returns the detector of this package."""
         return cls._load(None)
 
     @classmethod
     def load(cls, file: Any) -> Detector:
-        """The network of a file that ``wake train detector`` wrote, with the calibration beside it, if there is one.
+        """Loads a detector from a file of ``wake train detector``, with the calibration beside it, if there is one.
 
         Raises:
             FileError: A file that cannot be read.
-            WeightsError: Weights that do not fit, or find nothing in any image.
+            WeightsError: Weights that do not fit the network, or that detect nothing in any image.
         """
         return cls._load(_check.path("file", file))
 
@@ -102,16 +102,16 @@ class Detector:
         intensity: bool = False,
         threads: int | None = None,
     ) -> list[Detection]:
-        """The wakes of an image, the surest first.
+        """Returns the wakes of an image in descending order of score.
 
         Args:
-            image: ``[rows, columns]`` grey or amplitudes, at most 20,000 a side. What is no finite number is missing: land,
-                or pixels without data.
-            spacing: Size of a pixel [m], 0.5 to 100; without it the scale comes from the image.
-            least_score: Wakes of a lower score are left out, 0 to 1; by default as in ``wake detect``.
+            image: ``[rows, columns]`` grey or amplitudes, at most 20,000 pixels a side. Pixels that are not finite count as
+                missing: land, or pixels without data.
+            spacing: Pixel size [m], 0.5 to 100; by default, the scale is estimated from the image.
+            least_score: Lowest score of the reported wakes, 0 to 1; by default as in ``wake detect``.
             intensity: Whether ``image`` holds intensities, such as the normalized radar cross-section; the detector then
                 searches their square root.
-            threads: Number of threads, by default one a core.
+            threads: Number of threads, by default one per core.
 
         Raises:
             ArrayError: An image without two dimensions, without pixels, or not of real numbers.
@@ -132,18 +132,18 @@ class Detector:
         coast: float | None = 1000.0,
         threads: int | None = None,
     ) -> list[dict[str, Any]]:
-        """The wakes of a whole product as places on a map, the surest first.
+        """Returns the wakes of a whole product with their places on a map, in descending order of score.
 
-        Each has the keys of ``wakes.json`` of ``wake detect``: ``score``, ``probability``, ``direction_probability``, ``sure``,
-        ``tip`` and ``end`` (longitude, latitude), ``heading`` from true north, ``length`` [m], ``echo`` of the ship with its
-        displacement, and others.
+        Each wake has the keys of ``wakes.json`` of ``wake detect``: ``score``, ``probability``, ``direction_probability``,
+        ``sure``, ``tip`` and ``end`` (longitude, latitude), ``heading`` from true north, ``length`` [m], ``echo`` of the ship
+        with its displacement, and others.
 
         Args:
             product: The product.
-            spacing: Size of a pixel [m]; by default that of the product.
-            least_score: Wakes of a lower score are left out, 0 to 1; by default as in ``wake detect``.
-            coast: Sea closer to land is left out [m], 0 to 50,000; ``None`` searches land, too.
-            threads: Number of threads, by default one a core.
+            spacing: Pixel size [m]; by default, the product's.
+            least_score: Lowest score of the reported wakes, 0 to 1; by default as in ``wake detect``.
+            coast: Distance from land within which sea is not searched [m], 0 to 50,000; ``None`` searches land, too.
+            threads: Number of threads, by default one per core.
 
         Raises:
             ProductError: A product without pixels, or damaged.
@@ -163,17 +163,17 @@ class Detector:
 
 
 def pixel_size(spacing: float | None) -> float | None:
-    """A size of pixels that the detector takes."""
+    """Checks a pixel size."""
     return None if spacing is None else _check.number("spacing", spacing, 0.5, 100.0)
 
 
 def lowest(score: float) -> float:
-    """A least score that the detector takes."""
+    """Checks a least score."""
     return _check.number("least_score", score, 0.0, 1.0)
 
 
 def sea_from(coast: float | None) -> float | None:
-    """A distance from land that the detector takes."""
+    """Checks a distance from land."""
     return None if coast is None else _check.number("coast", coast, 0.0, 50_000.0)
 
 

@@ -1,4 +1,4 @@
-"""Exceptions of this package: one class a kind, each with the library's sentence as its text.
+"""Exceptions of this package: one class per kind of error, with the library's message as text.
 
 Every class also derives from the built-in exception that you would expect, so that ``except ValueError`` works.
 """
@@ -26,7 +26,7 @@ class ShipwakeError(Exception):
 
 
 class SceneError(ShipwakeError, ValueError):
-    """A scene has a value out of its range, values that contradict each other, or text that is no scene file."""
+    """A scene has a value out of its range, values that contradict each other, or text that is not a scene file."""
 
 
 class UnknownKeyError(ShipwakeError, KeyError):
@@ -41,11 +41,11 @@ class PromptError(ShipwakeError, ValueError):
 
 
 class RecipeError(ShipwakeError, ValueError):
-    """A recipe of a data set is not understood."""
+    """A recipe of a data set is invalid."""
 
 
 class OptionError(ShipwakeError, ValueError):
-    """An argument lies outside its range or is none of the allowed values."""
+    """An argument lies outside its range or is not one of the allowed values."""
 
 
 class ArrayError(ShipwakeError, ValueError):
@@ -53,7 +53,7 @@ class ArrayError(ShipwakeError, ValueError):
 
 
 class DatasetError(ShipwakeError, ValueError):
-    """A folder is no data set, another one than expected, or damaged."""
+    """A folder is not a data set, holds another data set than expected, or is damaged."""
 
 
 class WeightsError(ShipwakeError, ValueError):
@@ -61,7 +61,7 @@ class WeightsError(ShipwakeError, ValueError):
 
 
 class ProductError(ShipwakeError, ValueError):
-    """A file is no satellite product that can be read, or has no places."""
+    """A file is not a readable satellite product, or is not georeferenced."""
 
 
 class FileError(ShipwakeError, OSError):
@@ -73,7 +73,7 @@ class TooLargeError(ShipwakeError, MemoryError):
 
 
 class ModelError(ShipwakeError, RuntimeError):
-    """A network's numbers are not finite, or the device computes wrong ones."""
+    """A network's numbers are not finite, or the device computes wrong numbers."""
 
 
 class InternalError(ShipwakeError, RuntimeError):

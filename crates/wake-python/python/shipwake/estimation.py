@@ -1,4 +1,4 @@
-"""Images to ship and wind, with error bars."""
+"""Estimates of ship and wind from images, with error bars."""
 
 from __future__ import annotations
 
@@ -23,40 +23,40 @@ class Alternative:
     scene: Scene
     """The scene at the maximum."""
     weight: float
-    """Its probability, 0 to 1."""
+    """Probability of this maximum, 0 to 1."""
 
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """What :func:`estimate` finds. Names of values: ``speed`` [m/s], ``heading`` [deg], ``x`` and ``y`` of midship [m],
+    """Result of :func:`estimate`. Names of values: ``speed`` [m/s], ``heading`` [deg], ``x`` and ``y`` of midship [m],
     ``length`` [m], ``wind_speed`` [m/s], ``wind_toward`` [deg], and the logarithms of ``gain`` and ``texture``."""
 
     identifiable: bool
-    """Whether the image determines ship and wind; the values mean nothing if it does not."""
+    """Whether the image determines ship and wind; if not, the values are meaningless."""
     values: dict[str, float]
     """Values by name."""
     deviations: dict[str, float]
-    """Standard deviations by name; infinite where the image does not tell a value."""
+    """Standard deviations by name; infinite where the image does not determine a value."""
     covariance: npt.NDArray[np.float64] | None = field(repr=False)
-    """Covariance in the order of the values; ``None`` if the image does not tell one of them."""
+    """Covariance in the order of the values; ``None`` if the image leaves a value undetermined."""
     scene: Scene = field(repr=False)
-    """The likeliest scene."""
+    """The most likely scene."""
     mean: npt.NDArray[np.float32] = field(repr=False)
-    """Its mean image, in the unit of the image."""
+    """Mean image of this scene, in the unit of the image."""
     weight: float
     """Probability of this maximum, 0 to 1."""
     alternatives: list[Alternative] = field(repr=False)
     """Other maxima."""
     log_likelihood: float
-    """Log-likelihood, up to a constant of the image."""
+    """Log-likelihood, up to a constant that depends on the image."""
     over_open_sea: float
-    """Log-likelihood ratio to the sea without the ship."""
+    """Log-likelihood ratio to a sea without the ship."""
     power: list[float] = field(repr=False)
     """Power of the residual over its expectation in rings of wavenumbers, longest waves first: 1 for a perfect model."""
     misfit: float
     """Largest deviation of ``power`` from 1, as a factor."""
     by_echo: tuple[float, float] | None
-    """Velocity toward the radar by the displacement of the ship's echo alone, and its standard deviation [m/s]."""
+    """Velocity toward the radar from the displacement of the ship's echo alone, and its standard deviation [m/s]."""
 
 
 def estimate(
@@ -70,22 +70,22 @@ def estimate(
     calibrated: bool = True,
     threads: int | None = None,
 ) -> Estimate:
-    """Estimates ship and wind from an image of a wake, at any speed from 3.5 to 17 m/s.
+    """Estimates ship and wind from an image of a wake, for ship speeds from 3.5 to 17 m/s.
 
-    Searches within 2.5 standard deviations of place and heading. Takes a minute or so for 256 x 256 pixels on two cores.
+    Searches within 2.5 standard deviations of place and heading. Takes about a minute for 256 x 256 pixels on two cores.
 
     Args:
         image: Intensity with speckle, ``[rows, columns]`` of the scene's grid, in the unit of the normalized radar cross-section.
-        known: Radar, grid, water and hull. Its speed and wind do not count; of an uncalibrated image the wind speed does.
-        place: Midship ``(x, y)`` [m], by default that of the first ship of ``known``.
-        heading: Heading [deg clockwise from azimuth], by default that of the first ship of ``known``.
+        known: Radar, grid, water and hull. Its ship speed and wind are not used, except the wind speed if not ``calibrated``.
+        place: Midship ``(x, y)`` [m], by default from the first ship of ``known``.
+        heading: Heading [deg clockwise from azimuth], by default from the first ship of ``known``.
         place_sd: Standard deviation of the place along each axis [m].
         heading_sd: Standard deviation of the heading [deg].
         calibrated: Whether the brightness of the image is known within 3 %.
-        threads: Number of threads, by default one a core.
+        threads: Number of threads, by default one per core.
 
     Raises:
-        SceneError: An image of another size, or with values that are negative or no number; a scene without exactly one ship.
+        SceneError: An image of another size, or with negative or non-finite values; a scene without exactly one ship.
     """
     where = None
     if place is not None:
@@ -108,9 +108,9 @@ def estimate(
 
 
 def bound(scene: Scene, *, calibrated: bool = True, threads: int | None = None) -> dict[str, float]:
-    """Cramér–Rao bound: the smallest standard deviation of any unbiased estimate from one image of the scene, by name.
+    """Cramér–Rao bound: smallest standard deviations of unbiased estimates from one image of the scene, by name.
 
-    Names and units are those of :class:`Estimate`. Infinite where the image does not determine a value.
+    Names and units are as in :class:`Estimate`. Values that the image does not determine have an infinite bound.
 
     >>> from shipwake import Scene, bound
     >>> limits = bound(Scene(grid={"rows": 96, "columns": 96}))
@@ -120,6 +120,6 @@ def bound(scene: Scene, *, calibrated: bool = True, threads: int | None = None) 
     Args:
         scene: Sea, ship, radar and pixels.
         calibrated: Whether the brightness of the image is known within 3 %.
-        threads: Number of threads, by default one a core.
+        threads: Number of threads, by default one per core.
     """
     return _core.bound(_scene("scene", scene)._inner, bool(calibrated), _check.threads(threads))

@@ -1,4 +1,4 @@
-"""What is where in an image."""
+"""Labels of ships and wakes in an image."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ __all__ = ["Labels", "Object"]
 
 @dataclass(frozen=True, eq=False)
 class Object:
-    """A wake or a ship that a detector is to find.
+    """A wake or a ship that a detector should find.
 
-    Pixels are (column, row), whole numbers at the centres of pixels. Angles are degrees clockwise from the top of the
+    Pixels are (column, row), with whole numbers at the centres of pixels. Angles are degrees clockwise from the top of the
     image.
     """
 
@@ -25,19 +25,19 @@ class Object:
     box: npt.NDArray[np.float64]
     """``[4]``: x, y, width and height [pixels], cut to the image."""
     corners: npt.NDArray[np.float64]
-    """``[4, 2]``: corners of the box along the track, port ahead first, then clockwise; may lie outside the image."""
+    """``[4, 2]``: corners of the box along the track, clockwise from port ahead; may lie outside the image."""
     tip: tuple[float, float] | None
-    """The bow [pixels], where it is in the image."""
+    """Bow [pixels]; ``None`` outside the image."""
     axis_deg: float
-    """From the tip along the object, 0 to 360."""
+    """Direction from the tip along the object, 0 to 360."""
     half_angle_deg: float
     """Angle between axis and arms; 0 for a ship."""
     length: float
-    """Length along the axis that is visible in the image [pixels]; of a ship the whole."""
+    """Length along the axis that is visible in the image [pixels]; the whole length of a ship."""
     contrast_db: float | None
     """Contrast of a wake [dB]; ``None`` for a ship."""
     snr: float | None
-    """Signal-to-noise ratio of a wake for a filter that knows it; ``None`` for a ship."""
+    """Signal-to-noise ratio of a wake for its matched filter; ``None`` for a ship."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +47,9 @@ class Labels:
     objects: list[Object]
     """Visible wakes, and ships whose echo is drawn."""
     ships: list[dict[str, Any]]
-    """Every ship of the scene with its wake, also those outside the image; keys as in ``labels.json``."""
+    """Every ship of the scene with its wake, even outside the image; keys as in ``labels.json``."""
     sea_displacement_m: float
-    """Azimuth by which a radar displaces the whole sea [m]; it is not in the image."""
+    """Azimuth displacement of the whole sea by its mean Doppler shift [m]; the simulated image leaves it out."""
 
     @classmethod
     def _of(cls, labels: Mapping[str, Any]) -> Labels:

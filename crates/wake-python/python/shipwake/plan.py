@@ -1,4 +1,4 @@
-"""What a simulation computes, and estimates of what it leaves out."""
+"""Plans of simulations: computed terms, and the estimated effect of terms left out."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ class PlannedTerm:
     """One term of the physics."""
 
     term: str
-    """Its name, as in ``model.terms`` of a scene."""
+    """Name, as in ``model.terms`` of a scene."""
     used: bool
-    """Whether it is computed."""
+    """Whether the term is computed."""
     estimate: float
-    """Estimated relative change of the image where it is left out."""
+    """Estimated relative change of the image if the term is left out."""
     why: str
     """Reason for the choice."""
 
@@ -30,7 +30,7 @@ class Plan:
     terms: list[PlannedTerm]
     """Every term of the physics."""
     notes: list[str]
-    """What you should know about this scene."""
+    """Notes for the user about this scene."""
     left_out: float
     """Sum of the estimates of the terms that are left out."""
     core_seconds: float

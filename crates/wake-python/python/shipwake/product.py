@@ -1,4 +1,4 @@
-"""Satellite products and other rasters with places."""
+"""Satellite products and other georeferenced rasters."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ __all__ = ["Product"]
 
 
 class Product:
-    """A Sentinel-1 GRD product, a GeoTIFF, or a PNG or JPEG image without places.
+    """A Sentinel-1 GRD product, a GeoTIFF, or a PNG or JPEG image without georeference.
 
-    Lines and pixels count from 0, and a whole number is the centre of a pixel.
+    Lines and pixels count from 0, with whole numbers at the centres of pixels.
 
     ``product = Product.open("S1A_IW_GRDH_….SAFE")``
     """
@@ -32,16 +32,16 @@ class Product:
 
     @classmethod
     def open(cls, path: Any, polarization: str | None = None) -> Product:
-        """Opens a ``.SAFE`` folder, the ``.zip`` of one, or a TIFF, PNG or JPEG file; only the header is read.
+        """Opens a ``.SAFE`` folder, its ``.zip``, or a TIFF, PNG or JPEG file; only the header is read.
 
         Args:
             path: The product.
-            polarization: ``"VV"``, ``"HH"``, ``"VH"`` or ``"HV"`` of a Sentinel-1 product; by default the first of them
-                that it has.
+            polarization: ``"VV"``, ``"HH"``, ``"VH"`` or ``"HV"`` of a Sentinel-1 product; by default the first of these that
+                the product has.
 
         Raises:
             FileError: A path that cannot be read.
-            ProductError: A file that is no product, or is damaged.
+            ProductError: A file that is not a product, or is damaged.
         """
         product = cls.__new__(cls)
         product.path = _check.path("path", path)
@@ -51,17 +51,17 @@ class Product:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Number of lines, and of pixels of a line."""
+        """Number of lines, and of pixels per line."""
         return self._inner.shape()
 
     @property
     def is_calibrated(self) -> bool:
-        """Whether values are the normalized radar cross-section; samples of the file otherwise."""
+        """Whether values are the normalized radar cross-section; otherwise they are the samples of the file."""
         return self._inner.is_calibrated()
 
     @property
     def has_pixels(self) -> bool:
-        """Whether pixels can be read. A Sentinel-1 product may have its annotation alone."""
+        """Whether pixels can be read. A Sentinel-1 product may consist of its annotation only."""
         return self._inner.has_pixels()
 
     @property
@@ -70,25 +70,25 @@ class Product:
         return self._inner.has_places()
 
     def read(self, lines: slice | None = None, pixels: slice | None = None) -> npt.NDArray[np.float32]:
-        """Values of a window ``[lines, pixels]``; NaN where there are no data.
+        """Returns the values of a window ``[lines, pixels]``, with NaN where there are no data.
 
         Args:
-            lines: Such as ``slice(4000, 5024)``; by default all.
-            pixels: The same of the pixels of a line.
+            lines: Range of lines, such as ``slice(4000, 5024)``; by default all.
+            pixels: Range of pixels of each line; by default all.
 
         Raises:
-            OptionError: A window that is empty or leaves the image.
+            OptionError: A window that is empty or reaches beyond the image.
         """
         rows, columns = self.shape
         return self._inner.read(_range("lines", lines, rows), _range("pixels", pixels, columns))
 
     def place(self, line: float, pixel: float) -> dict[str, Any]:
-        """``latitude`` and ``longitude`` of a pixel [degrees]; of a Sentinel-1 product also ``height`` [m], ``incidence``
-        [degrees] and ``slant_range_time`` [s], else ``None``."""
+        """Returns ``latitude`` and ``longitude`` of a pixel [degrees]; for Sentinel-1 products also ``height`` [m], ``incidence``
+        [degrees] and ``slant_range_time`` [s], for others ``None``."""
         return self._inner.place(*_pixel(line, pixel))
 
     def pixel_of(self, latitude: float, longitude: float) -> tuple[float, float] | None:
-        """Line and pixel of a place [degrees], or ``None`` where it lies outside the image."""
+        """Returns line and pixel of a place [degrees], or ``None`` outside the image."""
         largest = float("inf")
         return self._inner.pixel_of(
             _check.number("latitude", latitude, -largest, largest),
@@ -96,17 +96,17 @@ class Product:
         )
 
     def axes(self, line: float, pixel: float) -> dict[str, float]:
-        """Directions of increasing line and pixel from true north [degrees], and distances between pixels [m]: keys
+        """Returns the directions of increasing line and pixel from true north [degrees] and the spacings [m], with the keys
         ``line_azimuth``, ``pixel_azimuth``, ``line_spacing`` and ``pixel_spacing``."""
         return self._inner.axes(*_pixel(line, pixel))
 
     def range_to_velocity(self, line: float, pixel: float) -> float | None:
-        """Slant range over platform speed [s], for ``radar.range_to_velocity`` of a scene; ``None`` for other images than
-        Sentinel-1 products."""
+        """Returns the ratio of slant range and platform speed [s], ``radar.range_to_velocity`` of a scene; ``None`` unless the
+        image is a Sentinel-1 product."""
         return self._inner.range_to_velocity(*_pixel(line, pixel))
 
     def locate(self, line: int, pixel: int, digital_number: float | None = None) -> dict[str, Any]:
-        """Everything about one pixel: place, calibration, and the normalized radar cross-section of the measurement, or of
+        """Returns place, calibration and normalized radar cross-section of a pixel, from its measured value or from
         ``digital_number``."""
         given = None if digital_number is None else _check.number("digital_number", digital_number, 0.0, 1e9)
         most = 2**63 - 1

@@ -1,6 +1,6 @@
-"""Data sets and searches on a cluster of Ray.
+"""Data sets and searches on a Ray cluster.
 
-A row is a function of the data set and its number alone, so the number of workers, their restarts and retries change no byte of it.
+A row depends only on the data set and its index, so its bytes do not change with the number of workers, restarts or retries.
 
 Needs the package ``ray[data]``::
 
@@ -14,9 +14,9 @@ Needs the package ``ray[data]``::
     rows.write_parquet("s3://bucket/wakes")
     rows.write_webdataset("s3://bucket/wakes", encoder=sample)
 
-Ray keeps a core for each worker of a pool; leave it one more for what comes after them, such as writing, or hand over
-``Simulate(data)``, which Ray runs as tasks without a pool. The order of rows, and how they lie in files, is Ray's;
-:func:`write` makes the folder of ``wake dataset`` byte for byte.
+Ray reserves a core for each worker of a pool; leave one more for later stages such as writing, or pass ``Simulate(data)``, which
+Ray runs as tasks without a pool. Ray chooses the order of rows and their files; :func:`write` makes the folder of
+``wake dataset`` byte for byte.
 """
 
 from __future__ import annotations
@@ -39,15 +39,15 @@ __all__ = ["Detect", "Simulate", "sample", "write"]
 
 
 class Simulate:
-    """Turns numbers of images into images with labels: for :meth:`ray.data.Dataset.map_batches`.
+    """Turns image indices into images with labels, for :meth:`ray.data.Dataset.map_batches`.
 
-    Columns of the table: ``index``; ``png``, the bytes of a PNG file of 8 bits; ``txt``, the prompt; ``json``, the line of
-    ``metadata.jsonl`` of ``wake dataset`` with all values and labels; and of its labels ``bbox`` (x, y, width, height),
+    Columns of the table: ``index``; ``png``, the bytes of an 8-bit PNG file; ``txt``, the prompt; ``json``, the line of
+    ``metadata.jsonl`` of ``wake dataset`` with all values and labels; and from its labels ``bbox`` (x, y, width, height),
     ``oriented`` (four corners) and ``categories`` (0 wake, 1 ship) [pixels].
 
     Args:
         dataset: The data set.
-        column: The column of the batch that holds numbers of images; ``"id"`` is that of ``ray.data.range``.
+        column: Column of the batch with the image indices; ``ray.data.range`` names it ``"id"``.
         threads: Number of threads of a worker.
     """
 
@@ -79,16 +79,16 @@ class Simulate:
 
 
 def sample(row: Mapping[str, Any]) -> dict[str, Any]:
-    """A row of :class:`Simulate` as the three files that ``wake dataset --webdataset`` writes.
+    """Turns a row of :class:`Simulate` into the three files that ``wake dataset --webdataset`` writes.
 
-    The ``encoder`` of :meth:`ray.data.Dataset.write_webdataset`.
+    Pass it as ``encoder`` to :meth:`ray.data.Dataset.write_webdataset`.
     """
     files = {ending: row[ending] for ending in ("json", "png", "txt")}
     return {"__key__": f"{row['index']:06d}", **files}
 
 
 class Detect:
-    """Finds the wakes of satellite products and image files: for :meth:`ray.data.Dataset.map_batches`.
+    """Finds the wakes in satellite products and image files, for :meth:`ray.data.Dataset.map_batches`.
 
     ::
 
@@ -97,15 +97,15 @@ class Detect:
         found = scenes.map_batches(Detect, fn_constructor_kwargs={"coast": 2000}, batch_size=1, compute=pool)
         found.write_parquet("s3://bucket/found")
 
-    Columns of the table: ``path``; ``wakes``, a list of those that :meth:`shipwake.Detector.find_in` returns; and ``error``, why
-    a scene was not searched, and empty where it was.
+    Columns of the table: ``path``; ``wakes``, the list that :meth:`shipwake.Detector.find_in` returns; and ``error``, why the
+    file could not be searched, or empty text.
 
     Args:
-        spacing: As of :meth:`shipwake.Detector.find_in`, as are ``least_score`` and ``coast``.
-        least_score: Wakes of a lower score are left out.
-        coast: Sea closer to land is left out [m].
-        weights: File of weights that every worker can read; by default those of the package.
-        column: The column of the batch that holds paths.
+        spacing: Pixel size [m], as in :meth:`shipwake.Detector.find_in`.
+        least_score: Lowest score of the reported wakes.
+        coast: Distance from land within which sea is not searched [m]; ``None`` searches land, too.
+        weights: File of weights that every worker can read; by default the weights of the package.
+        column: Column of the batch with the paths.
         threads: Number of threads of a worker.
     """
 
@@ -151,18 +151,18 @@ class Detect:
 
 
 def write(dataset: Dataset, folder: Any, *, shards: int = 16, val_share: float = 0.1) -> int:
-    """Writes the folder that :meth:`shipwake.Dataset.write` writes, byte for byte, by one task a shard.
+    """Writes the same folder as :meth:`shipwake.Dataset.write`, byte for byte, with one task per shard.
 
-    A task whose worker is lost is tried again, up to five times, and goes on where its shard was.
+    A task whose worker is lost is retried up to five times, and resumes its shard.
 
     Args:
         dataset: The data set.
-        folder: A folder that every node can write, made if absent.
+        folder: A folder that every node can write to, made if absent.
         shards: Number of tasks, each on one core.
-        val_share: Share of the images that are for validation, 0 to 1.
+        val_share: Share of the images for validation, 0 to 1.
 
     Returns:
-        Number of images of the set.
+        Number of images in the data set.
 
     Raises:
         DatasetError: A folder that holds something else, or a damaged file.

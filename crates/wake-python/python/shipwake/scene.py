@@ -1,4 +1,4 @@
-"""Scenes: a ship, a sea and a radar over a grid of pixels."""
+"""Scenes: ships, sea and radar over a grid of pixels."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from .plan import Plan
 __all__ = ["Scene", "Wording"]
 
 Wording: TypeAlias = Literal["paper", "wind-first", "radar-first", "brief"]
-"""How a scene is put in words."""
+"""Wordings of the prompt of a scene."""
 
 _WORDINGS: tuple[str, ...] = ("paper", "wind-first", "radar-first", "brief")
 _DEFAULT_SHIP: Mapping[str, Any] = {}
 
 
 class Scene:
-    """A ship, a sea and a radar over a grid of pixels: what is simulated.
+    """Ships, sea and radar over a grid of pixels, to be simulated.
 
-    Each table holds the keys of a scene file in SI units and degrees; a key that is absent has its default value, and
-    unknown keys are errors. Scenes do not change; :meth:`with_values` makes another one.
+    Each table holds the keys of a scene file in SI units and degrees; absent keys have their default values, and unknown keys
+    are errors. Scenes are immutable; :meth:`with_values` returns a new one.
 
     >>> from shipwake import Scene
     >>> scene = Scene(ship={"speed": 8, "heading": 90}, sea={"wind_speed": 3}, grid={"rows": 64, "columns": 64})
@@ -36,16 +36,16 @@ class Scene:
     shipwake.errors.SceneError: ship.speed is 80, outside 0 to 40 m/s
 
     Args:
-        ship: One ship, a list of ships, or ``None`` for open sea; by default one ship of default values.
+        ship: One ship, a list of ships, or ``None`` for open sea; by default one default ship.
         sea: Wind and waves.
-        radar: The radar and its platform; ``{"sensor": "sentinel-1-iw"}`` sets what a satellite has.
+        radar: The radar and its platform; ``{"sensor": "sentinel-1-iw"}`` sets the values of a satellite.
         grid: Rows, columns and spacing of the pixels.
         model: Terms of the physics that are computed, and their tolerance.
         seed: Seed of the random sea and of the speckle, 0 to 2**64 - 1.
 
     Raises:
         SceneError: A value out of its range, or an unknown key.
-        TypeError: A value that has no form in a scene file.
+        TypeError: A value that a scene file cannot hold.
     """
 
     __slots__ = ("_inner", "_tables")
@@ -91,7 +91,7 @@ class Scene:
         8.0
 
         Raises:
-            SceneError: Text that is no scene file, with line and key.
+            SceneError: Text that is not a scene file; the message names line and key.
         """
         return cls._of(_core.Scene.from_toml(_check.text("text", text)))
 
@@ -100,14 +100,14 @@ class Scene:
         """Reads a scene file.
 
         Raises:
-            FileError: A file that cannot be read, or is no scene file.
+            FileError: A file that cannot be read, or is not a scene file.
             SceneError: A value out of its range.
         """
         return cls._of(_core.Scene.read(_check.path("path", path)))
 
     @classmethod
     def from_prompt(cls, prompt: str, base: Scene | None = None) -> Scene:
-        """The scene that a prompt states. What the prompt leaves open is that of ``base``, by default the default scene.
+        """Returns the scene that a prompt states. All other values are those of ``base``, by default the default scene.
 
         >>> scene = Scene.from_prompt("a ship at 8 m/s toward 135 degrees, wind 5 m/s")
         >>> scene["ship.speed"], scene["ship.heading"], scene["sea.wind_speed"]
@@ -121,7 +121,7 @@ class Scene:
         return cls._of(scene)
 
     def prompt(self, wording: Wording = "paper") -> str:
-        """The scene in words. Of several ships the prompt states speed and heading of the first.
+        """Returns the scene in words. With several ships, the prompt states speed and heading of the first.
 
         >>> Scene(ship=None).prompt("brief")
         'SAR open sea, no ship, wind 5 mps toward 90 degrees, fetch 40000 meter, incidence 32 degrees.'
@@ -131,13 +131,13 @@ class Scene:
         return self._inner.prompt(_WORDINGS.index(wording))
 
     def to_toml(self) -> str:
-        """The scene as the text of a scene file."""
+        """Returns the scene as the text of a scene file."""
         return self._inner.to_toml()
 
     def to_dict(self) -> dict[str, Any]:
-        """The tables of the scene, with every key that has a value; ``Scene(**scene.to_dict())`` is the same scene.
+        """Returns the tables of the scene, with every key that has a value; ``Scene(**scene.to_dict())`` is the same scene.
 
-        A scene without a ship has no key ``ship`` in a file; here it is ``None``.
+        Without a ship, ``ship`` is ``None``, while a file has no such key.
         """
         return copy.deepcopy(self._values())
 
@@ -152,9 +152,9 @@ class Scene:
         return self._tables
 
     def with_values(self, values: Mapping[str, Any] | None = None, /, **tables: Mapping[str, Any]) -> Scene:
-        """The scene with other values, by keys such as ``"ship.speed"`` or as tables.
+        """Returns the scene with other values, by keys such as ``"ship.speed"`` or as tables.
 
-        With several ships the first is ``ship.1``. A number one past the last adds a ship.
+        With several ships, the first is ``ship.1``. The number after the last adds a ship.
 
         >>> scene = Scene().with_values({"ship.speed": 6, "seed": 1}, sea={"wind_speed": 4})
         >>> scene["ship.speed"], scene["sea.wind_speed"]
@@ -175,7 +175,7 @@ class Scene:
         return self._of(self._inner.with_values(changes))
 
     def __getitem__(self, key: str) -> Any:
-        """The value of a key such as ``"ship.speed"``; with several ships the first is ``ship.1``.
+        """Returns the value of a key such as ``"ship.speed"``; with several ships, the first is ``ship.1``.
 
         Raises:
             UnknownKeyError: No such key, or a key without a value.
@@ -196,11 +196,11 @@ class Scene:
         raise TypeError("a scene is no sequence; use to_dict()")
 
     def labels(self) -> Labels:
-        """Labels of the image, without making it."""
+        """Returns the labels of the image without simulating it."""
         return Labels._of(self._inner.labels())
 
     def plan(self) -> Plan:
-        """The plan of a simulation, with its cost, without making it.
+        """Returns the plan of the simulation, with its cost, without running it.
 
         Raises:
             TooLargeError: A grid that does not fit in memory.
@@ -215,7 +215,7 @@ class Scene:
 
     @property
     def spacing(self) -> float:
-        """Size of a pixel [m]."""
+        """Pixel size [m]."""
         return self._inner.grid()[2]
 
     @property

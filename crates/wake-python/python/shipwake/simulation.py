@@ -1,4 +1,4 @@
-"""Scenes to images, by physics."""
+"""Physical simulation of images from scenes."""
 
 from __future__ import annotations
 
@@ -32,28 +32,28 @@ FIELDS: Mapping[str, tuple[str, str]] = {
     "intensity": ("1", "intensity of the image before speckle"),
     "speckled": ("1", "intensity of the image with speckle"),
 }
-"""Fields of a simulation, with their units and meaning."""
+"""Fields of a simulation, with units and meanings."""
 
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """What :func:`simulate` makes. Images are ``[rows, columns]``: row 0 has the largest azimuth, column 0 the smallest
+    """Result of :func:`simulate`. Images are ``[rows, columns]``: row 0 has the largest azimuth, column 0 the smallest
     ground range."""
 
     scene: Scene
-    """The scene."""
+    """The simulated scene."""
     fields: dict[str, npt.NDArray[np.float32]] = field(repr=False)
     """All fields by name; :data:`FIELDS` has units and meanings."""
     slc: npt.NDArray[np.complex64] | None = field(repr=False)
     """Single-look complex image, where the radar has an impulse response and one look."""
     labels: Labels = field(repr=False)
-    """Where ships and wakes are."""
+    """Labels of ships and wakes."""
     plan: Plan = field(repr=False)
-    """What was computed, and estimates of what was not."""
+    """Computed terms, and the estimated effect of terms left out."""
     seconds: dict[str, float] = field(repr=False)
     """Computing time by stage [s]."""
     accuracy: dict[str, Any] = field(repr=False)
-    """Errors that the fast methods reached, beside what was asked for."""
+    """Errors that the fast methods reached, beside the tolerances."""
     grey: dict[str, Any] = field(repr=False)
     """Mapping from intensity to grey of the quick-look: ``darkest_db``, ``brightest_db`` and ``mapping``."""
 
@@ -68,18 +68,18 @@ class Simulation:
         return self.fields["speckled"]
 
     def levels(self) -> npt.NDArray[np.uint8]:
-        """The image as grey of 8 bits, linear in amplitude; the scale depends on the scene, not on the pixels."""
+        """Returns the image as 8-bit grey levels, linear in amplitude; the scale depends on the scene, not on the pixels."""
         return levels(self.speckled, self.grey)
 
     def _repr_png_(self) -> bytes:
         return _core.png(self.levels())
 
     def write_png(self, path: Any) -> None:
-        """Writes the image as a grey PNG of 8 bits, see :meth:`levels`."""
+        """Writes the image as an 8-bit grey PNG, see :meth:`levels`."""
         _write(path, self._repr_png_())
 
     def to_xarray(self) -> xarray.Dataset:
-        """All fields as an :class:`xarray.Dataset` with coordinates ``y`` (azimuth) and ``x`` (ground range) in metres.
+        """Returns all fields as an :class:`xarray.Dataset` with coordinates ``y`` (azimuth) and ``x`` (ground range) in metres.
 
         Needs the package ``xarray``. The scene is an attribute, as the text of a scene file.
         """
@@ -117,9 +117,9 @@ def simulate(scene: Scene, *, threads: int | None = None, direct: bool = False) 
     10.0
 
     Args:
-        scene: What is simulated.
-        threads: Number of threads, by default one a core.
-        direct: Use the slow reference methods in place of the fast ones.
+        scene: The scene to simulate.
+        threads: Number of threads, by default one per core.
+        direct: Use the slow reference methods instead of the fast ones.
 
     Raises:
         TooLargeError: A grid that does not fit in memory.
@@ -138,7 +138,7 @@ def simulate(scene: Scene, *, threads: int | None = None, direct: bool = False) 
 
 
 def expected_intensity(scene: Scene, *, threads: int | None = None) -> npt.NDArray[np.float32]:
-    """Mean over all seas of the intensity before speckle, ``[rows, columns]``: the wake without the noise of the sea."""
+    """Returns the mean over all seas of the intensity before speckle, ``[rows, columns]``: the wake without random waves."""
     return _core.expected_intensity(_scene("scene", scene)._inner, _check.threads(threads))
 
 
@@ -152,9 +152,9 @@ def simulate_batch(
     speckle: bool = True,
     threads: int | None = None,
 ) -> npt.NDArray[np.float32]:
-    """Simulates a scene for each row of an array of values: the simulator that ``sbi`` asks for.
+    """Simulates a scene for each row of an array of values, as a simulator for ``sbi``.
 
-    Image i depends on row i, ``base``, ``seed`` and ``first + i`` alone: a batch may be split anywhere and made by any
+    Image i depends only on row i, ``base``, ``seed`` and ``first + i``, so a batch can be split anywhere and made by any
     number of threads or machines.
 
     >>> import numpy as np
@@ -165,20 +165,20 @@ def simulate_batch(
     (2, 1, 32, 32)
 
     Args:
-        theta: ``[n, k]`` values.
+        theta: Values ``[n, k]``.
         keys: ``k`` keys of a scene, such as ``"ship.speed"``.
-        base: Values that are not in ``keys``; by default the default scene.
+        base: Scene with the values of all other keys; by default the default scene.
         seed: Seed of the batch; the random sea of image i comes from it and from ``first + i``.
         first: Number of the first image.
         speckle: Whether images have speckle.
-        threads: Number of threads, by default one a core.
+        threads: Number of threads, by default one per core.
 
     Returns:
         ``[n, 1, rows, columns]`` intensities, linear, in the unit of the normalized radar cross-section.
 
     Raises:
         ArrayError: ``theta`` without two dimensions, or with another number of columns than ``keys``.
-        SceneError: A value out of its range, with the key.
+        SceneError: A value out of its range; the message names the key.
         TooLargeError: Images that do not fit in memory together.
     """
     if isinstance(keys, str) or not isinstance(keys, Sequence):
@@ -198,7 +198,7 @@ def simulate_batch(
 
 
 def levels(power: npt.ArrayLike, grey: Mapping[str, Any]) -> npt.NDArray[np.uint8]:
-    """Intensities ``[rows, columns]`` as grey of 8 bits by a mapping such as :attr:`Simulation.grey`."""
+    """Converts intensities ``[rows, columns]`` to 8-bit grey levels by a mapping such as :attr:`Simulation.grey`."""
     image = _check.array("power", power, 2, np.float32)
     darkest = _check.number("darkest_db", grey["darkest_db"], -200.0, 100.0)
     brightest = _check.number("brightest_db", grey["brightest_db"], -200.0, 100.0)

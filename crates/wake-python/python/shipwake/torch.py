@@ -1,4 +1,4 @@
-"""For torch: batches as tensors, and an iterable data set that gives the same batches with any number of workers.
+"""Batches as torch tensors, and an iterable data set that gives the same batches with any number of workers.
 
 Needs the package ``torch``.
 """
@@ -20,7 +20,7 @@ __all__ = ["Batches", "TensorBatch", "collate"]
 
 
 class TensorBatch(TypedDict):
-    """Some images as tensors, see :class:`shipwake.dataset.Item`."""
+    """Several images as tensors, see :class:`shipwake.dataset.Item`."""
 
     index: torch.Tensor
     """``[images]``, whole numbers."""
@@ -35,7 +35,7 @@ class TensorBatch(TypedDict):
 
 
 def collate(items: Sequence[Item]) -> TensorBatch:
-    """The ``collate_fn`` of a :class:`torch.utils.data.DataLoader` over a :class:`shipwake.Dataset`."""
+    """Collates items into tensors: ``collate_fn`` of a :class:`torch.utils.data.DataLoader` over a :class:`shipwake.Dataset`."""
     return {
         "index": torch.tensor([one["index"] for one in items]),
         "image": torch.stack([torch.from_numpy(one["image"]) for one in items]),
@@ -51,13 +51,13 @@ def collate(items: Sequence[Item]) -> TensorBatch:
 class Batches(IterableDataset[TensorBatch]):
     """Batches of a data set in order, for ``DataLoader(Batches(data, 16), batch_size=None, num_workers=2)``.
 
-    Worker k of n makes batches k, k + n, k + 2n, …, and the loader takes from them in turn: the order is that of the data
-    set, whatever the number of workers.
+    Worker k of n makes batches k, k + n, k + 2n, …, and the loader takes batches from the workers in turn, so they keep the order
+    of the data set with any number of workers.
 
     Args:
         dataset: The data set.
-        size: Images of a batch.
-        start: Number of the first batch, to go on where a run was stopped.
+        size: Images per batch.
+        start: Number of the first batch, to resume a run that was stopped.
     """
 
     def __init__(self, dataset: Dataset, size: int, start: int = 0) -> None:

@@ -1,4 +1,4 @@
-//! Simulated images in which wakes are clear more often than by chance.
+//! Simulated images with an increased share of clear wakes.
 
 use std::ops::Range;
 
@@ -8,9 +8,9 @@ use wake_physics::labels_of;
 
 use super::sample::wakes;
 
-/// Scenes of which the first with a clear wake is simulated, at every other position.
+/// Number of candidate scenes per position; at every other position the first one with a clear wake is simulated.
 const OF: u64 = 4;
-/// Signal over noise of a clear wake's line.
+/// Least signal-to-noise ratio of a clear wake's line.
 const CLEAR: f32 = 8.0;
 
 /// Images of a recipe; at even positions the first of four scenes that shows a clear wake.
@@ -29,7 +29,7 @@ impl Clear {
         self.simulated.seed()
     }
 
-    /// Whether a scene shows a clear wake. Labels tell so before an image is simulated.
+    /// Whether a scene shows a clear wake, by its labels, which need no simulated image.
     fn is_clear(&self, index: u64) -> wake_dataset::Result<bool> {
         let scene = self.simulated.scene(index)?;
         let seen = wakes(&labels_of(&scene).objects(), &scene);
@@ -66,7 +66,7 @@ mod tests {
     use super::*;
     use wake_dataset::Recipe;
 
-    /// At even positions a clear wake is there whenever one of the candidates has it; at odd ones the first is taken.
+    /// At even positions a scene with a clear wake is chosen if one of the candidates has it, at odd ones the first candidate.
     #[test]
     fn clear_wakes_are_chosen() {
         let changes = ["scene.grid.rows = 96", "scene.grid.columns = 96"];
@@ -87,7 +87,7 @@ mod tests {
             first += usize::from(clear(of.start));
         }
         assert!(chosen > first, "{chosen} {first}");
-        // Labels of the image say the same.
+        // Images are those of the chosen scenes.
         let pairs = source.items(0..2).expect("pairs");
         let [even, odd] = [0, 1].map(|position| source.chosen(position).expect("a scene"));
         assert_eq!(pairs[0], source.simulated.pair(even).expect("a pair"));

@@ -1,4 +1,5 @@
-//! Simulated images under what the simulator does not know: land, islets, piers, streaks, ships at rest, fronts, filaments, borders.
+//! Simulated images under painted clutter that the simulator does not model: land, islets, piers, streaks, ships at rest,
+//! fronts, filaments, borders.
 
 use std::ops::Range;
 
@@ -15,7 +16,7 @@ use super::sea::{Echoes, border, clutter, filaments, front};
 const FRONTS: f32 = 0.12;
 /// Share of images with filaments.
 const FILAMENTS: f32 = 0.15;
-/// Clutter this bright, in medians of the image, hides a wake.
+/// Brightness above which clutter hides a wake, in medians of the image.
 const HIDES: f32 = 0.5;
 /// Random numbers of the clutter, apart from those of other draws of the same seed.
 const STREAM: u64 = 0xC1_77E5;
@@ -31,7 +32,7 @@ impl Cluttered {
         Self { clear }
     }
 
-    /// Paints over an image.
+    /// Paints clutter over an image.
     fn painted_over(&self, mut pair: Pair) -> Pair {
         let draw = &mut Draw::new(self.clear.seed() ^ STREAM, pair.index);
         let size = pair.image.rows;
@@ -61,7 +62,7 @@ impl Cluttered {
     }
 }
 
-/// Weakens a wake by what is hidden of its line: a matched filter sees the rest.
+/// Lowers a wake's signal-to-noise ratio by the hidden part of its line, as of a matched filter on the rest.
 fn hide(wake: &mut WakeLabel, size: usize, hidden: impl Fn(usize) -> bool) {
     let (Some(visibility), Some([a, b, c, d])) = (&mut wake.visibility, wake.oriented_box_px)
     else {
@@ -103,7 +104,7 @@ mod tests {
         Cluttered::new(Clear::new(simulated))
     }
 
-    /// Images follow from their positions; where nothing was painted the simulated grey stands.
+    /// Images depend on their positions alone; where nothing is painted the simulated grey stays.
     #[test]
     fn clutter_lies_over_simulated_images() {
         let source = source();
@@ -120,7 +121,7 @@ mod tests {
         assert!(kept > all / 4 && kept < all, "{kept} of {all}");
     }
 
-    /// Three quarters of a line under land leave half its signal over noise; a wake that is free keeps it.
+    /// A wake with three quarters of its line under land keeps half its signal-to-noise ratio, a free wake all of it.
     #[test]
     fn hidden_wakes_are_weaker() {
         let label = || WakeLabel {

@@ -1,4 +1,4 @@
-//! The training pairs of a data set, walked through again and again.
+//! Training pairs of a data set, in endless epochs.
 
 use std::ops::Range;
 use std::path::Path;
@@ -8,7 +8,7 @@ use wake_dataset::{Folder, Pair, Source, shuffled};
 
 use crate::error::Result;
 
-/// Every training pair of a folder once in each epoch, shuffled anew, without end. Validation pairs are never drawn.
+/// Every training pair of a folder once in each epoch, in a new order each time; validation pairs are never drawn.
 #[derive(Debug)]
 pub(super) struct TrainingData {
     folder: Folder,
@@ -22,7 +22,7 @@ impl TrainingData {
     ///
     /// # Errors
     ///
-    /// As [`Folder::open`]; [`wake_nn::Error::OutOfRange`] for images of another size and for fewer than one training pair.
+    /// As [`Folder::open`]; [`wake_nn::Error::OutOfRange`] for images of another size and for a set without training pairs.
     pub(super) fn open(path: &Path, seed: u64, size: usize) -> Result<Self> {
         let folder = Folder::open(path)?;
         let grid = &folder.manifest().recipe.scene.grid;
@@ -49,7 +49,7 @@ impl TrainingData {
         })
     }
 
-    /// Identity of the pairs, as a run notes it.
+    /// Identity of the pairs, for the record of a run.
     pub(super) fn identity(&self) -> Value {
         json!({"set": self.folder.manifest(), "pairs": self.positions.len()})
     }
@@ -103,7 +103,7 @@ mod tests {
             orders.push(order);
         }
         assert!(orders[0] != orders[1] || orders[1] != orders[2]);
-        // Pair by pair as in one piece.
+        // A pair alone is the same as in a batch.
         let alone = data.items(2..3).unwrap();
         assert_eq!(alone[0].index, orders[0][2]);
     }

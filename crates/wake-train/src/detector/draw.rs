@@ -8,7 +8,7 @@ use rand_distr::StandardNormal;
 pub(crate) struct Draw(Xoshiro256PlusPlus);
 
 impl Draw {
-    /// Those of a seed and a position.
+    /// Random numbers of a seed and a position.
     pub(crate) fn new(seed: u64, index: u64) -> Self {
         let mixed =
             seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ index.wrapping_mul(0xD1B5_4A32_D192_ED03);

@@ -1,4 +1,4 @@
-//! Squares of labelled images, for fine-tuning with a few real labels.
+//! Square crops of labelled images, for fine-tuning with a few real labels.
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -13,30 +13,30 @@ use super::judging::Tile;
 use super::painted::label;
 use crate::error::{Error, Result};
 
-/// Signal over noise of a wake that the labeller was sure of, and of one that he was not: nothing is learnt around it.
+/// Signal-to-noise ratios given to labels that count, and to doubtful ones, around which nothing is learnt.
 const SURE: f32 = 20.0;
 const UNSURE: f32 = 3.0;
-/// Draws of squares are others than those of other sources of the same seed.
+/// Separates the random numbers of the crops from those of other sources with the same seed.
 const SQUARES: u64 = 0x1A_BE11;
 
-/// Which labelled images a run learns from.
+/// Selection of labelled images to train on.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LabelledImages {
     /// Folder of images with `labels.json`.
     pub folder: PathBuf,
     /// Name of the image that is left out, if any.
     pub without: Option<String>,
-    /// Number of images, the next ones by name after the one that is left out; all others where absent.
+    /// Number of images, taken by name after the one that is left out; `None`: all others.
     pub count: Option<usize>,
 }
 
 impl LabelledImages {
-    /// Reads and chooses them.
+    /// Reads the selected images.
     ///
     /// # Errors
     ///
-    /// As [`Tile::read_all`]; [`wake_nn::Error::InvalidOption`] for an image that is not there, and [`wake_nn::Error::OutOfRange`] for
-    /// more images than are left.
+    /// As [`Tile::read_all`]; [`wake_nn::Error::InvalidOption`] for an image that does not exist, and
+    /// [`wake_nn::Error::OutOfRange`] for more images than are left.
     pub fn read(&self) -> Result<Vec<Tile>> {
         let mut tiles = Tile::read_all(&self.folder)?;
         if let Some(name) = &self.without {
@@ -61,7 +61,7 @@ impl LabelledImages {
     }
 }
 
-/// Squares of labelled images: every other one around a wake, the others anywhere.
+/// Square crops of labelled images: every other one around a wake, the others anywhere.
 #[derive(Debug)]
 pub(crate) struct Labelled {
     tiles: Vec<(GreyImage, Vec<Wake>)>,
@@ -70,11 +70,11 @@ pub(crate) struct Labelled {
 }
 
 impl Labelled {
-    /// Squares of `size` pixels.
+    /// Crops of `size` rows and columns.
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::OutOfRange`] for an image smaller than a square.
+    /// [`wake_nn::Error::OutOfRange`] for an image smaller than a crop.
     pub(crate) fn new(tiles: Vec<Tile>, seed: u64, size: usize) -> Result<Self> {
         let of = |tile: Tile| {
             let smallest = tile.image.rows().min(tile.image.columns());
@@ -97,7 +97,7 @@ impl Labelled {
         })
     }
 
-    /// The square at a position.
+    /// Crop at a position.
     fn pair(&self, position: u64) -> Pair {
         let draw = &mut Draw::new(self.seed ^ SQUARES, position);
         let (image, wakes) = &self.tiles[draw.one_of(&vec![1.0; self.tiles.len()])];
@@ -144,7 +144,7 @@ impl Labelled {
         }
     }
 
-    /// Whether a place of the line lies in the square.
+    /// Whether any point of the wake's line lies in the crop.
     fn meets(&self, wake: &Wake) -> bool {
         let inside = |x: &f32| (0.0..self.size as f32).contains(x);
         (0..=32).any(|n| wake.at(wake.length * n as f32 / 32.0).iter().all(inside))
@@ -161,7 +161,7 @@ impl Source for Labelled {
     }
 }
 
-/// The source of some labelled images.
+/// Source of crops of labelled images.
 ///
 /// # Errors
 ///
@@ -225,7 +225,7 @@ mod tests {
         assert!(many.contains("labelled images is 4"), "{many}");
     }
 
-    /// The bright line lies on the ray of the label in every square that meets it, and a square follows from its position.
+    /// The bright line lies on the label's ray in every crop that it meets, and a crop depends on its position alone.
     #[test]
     fn labels_follow_the_squares() {
         let folder = tempfile::tempdir().unwrap();

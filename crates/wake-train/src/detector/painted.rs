@@ -97,7 +97,7 @@ impl Painted {
         let echoes = Echoes::draw(draw);
         let mut bright = vec![0.0; size * size];
         let mut wakes: Vec<Wake> = Vec::new();
-        // Ships of one image often go the same way.
+        // Ships of one image often have similar headings.
         let common = draw.between(0.0, 360.0);
         for _ in 0..draw.one_of(&[0.22, 0.45, 0.2, 0.13]) {
             let axis_deg = match draw.chance(0.3) {
@@ -131,7 +131,7 @@ struct Line {
     fade: f32,
     /// Standard deviation of the profile at its beginning \[pixels\].
     width: f32,
-    /// Distance from the axis at the beginning \[pixels\], and growth of it along the wake.
+    /// Distance from the axis at the beginning \[pixels\], and its growth along the wake.
     beside: f32,
     opening: f32,
 }
@@ -148,7 +148,7 @@ impl Line {
     }
 }
 
-/// The lines of a wake, contrasts relative to the strongest one, and half the angle they open [tangent].
+/// The lines of a wake, contrasts relative to the dark line, and the tangent of half their opening angle.
 fn lines(length: f32, draw: &mut Draw) -> (Vec<Line>, f32) {
     let zoom = draw.scale(0.7, 1.6);
     let side = draw.sign();
@@ -207,7 +207,7 @@ fn lines(length: f32, draw: &mut Draw) -> (Vec<Line>, f32) {
     (lines, half_angle)
 }
 
-/// A tip, most often in the image, from where the image shows at least some of the wake.
+/// Draws a tip, most often in the image, whose wake is at least partly visible.
 fn place(mean: &[f32], size: usize, axis_deg: f32, length: f32, draw: &mut Draw) -> [f32; 2] {
     let s = size as f32;
     let margin = if draw.chance(0.1) { 0.15 } else { 0.0 };
@@ -228,7 +228,7 @@ fn place(mean: &[f32], size: usize, axis_deg: f32, length: f32, draw: &mut Draw)
     tip
 }
 
-/// Multiplies a mean with a wake.
+/// Multiplies a mean by a wake and returns the wake.
 fn wake(mean: &mut [f32], size: usize, speckle: &Speckle, axis_deg: f32, draw: &mut Draw) -> Wake {
     let length = draw.scale(45.0, 500.0);
     let (lines, half_angle) = lines(length, draw);
@@ -244,7 +244,7 @@ fn wake(mean: &mut [f32], size: usize, speckle: &Speckle, axis_deg: f32, draw: &
     let rough = draw.between(0.0, 0.6);
     let texture: Vec<f32> = (0..64).map(|_| (rough * draw.normal()).exp()).collect();
     let [right, down] = direction(axis_deg);
-    // Pixels that the wake changes: where they are, how far along the wake, and by how much.
+    // Pixels that the wake changes: index, distance along the wake, and change.
     let mut changes: Vec<(usize, f32, f32)> = Vec::new();
     for (i, m) in mean.iter().enumerate() {
         let (x, y) = ((i % size) as f32 - tip[0], (i / size) as f32 - tip[1]);
@@ -253,7 +253,7 @@ fn wake(mean: &mut [f32], size: usize, speckle: &Speckle, axis_deg: f32, draw: &
             continue;
         }
         let across = y * right - x * down - bend * along * along;
-        // Nothing of a wake lies further off than this.
+        // No line of a wake lies further from its axis.
         if across.abs() > 40.0 + 0.4 * along {
             continue;
         }
@@ -264,7 +264,7 @@ fn wake(mean: &mut [f32], size: usize, speckle: &Speckle, axis_deg: f32, draw: &
         let change: f32 = lines.iter().map(|line| line.at(along, across)).sum();
         changes.push((i, along, begin * grain * change));
     }
-    // Strength follows from the signal over noise that is wanted, as far as contrasts go.
+    // The strength gives the drawn signal-to-noise ratio, up to the largest contrast.
     let power = changes.iter().map(|c| c.2 * c.2).sum::<f32>() / speckle.correlated_pixels();
     let peak = changes.iter().map(|c| c.2.abs()).fold(0.0, f32::max);
     let strength = (draw.scale(3.5, 35.0) / power.sqrt()).min(MOST / peak);
@@ -295,7 +295,7 @@ fn wake(mean: &mut [f32], size: usize, speckle: &Speckle, axis_deg: f32, draw: &
 
 /// The largest contrast \[standard deviations of a pixel\].
 const MOST: f32 = 4.0;
-/// Contrast that counts as visible, in standard deviations of a pixel.
+/// Least visible contrast \[standard deviations of a pixel\].
 const VISIBLE: f32 = 0.3;
 
 #[cfg(test)]
@@ -313,7 +313,7 @@ mod tests {
         );
     }
 
-    /// What a loader gives of a painted image is what was painted.
+    /// A painted image keeps its wakes as a pair of the source.
     #[test]
     fn pairs_keep_the_wakes() {
         let source = Painted { seed: 5, size: 96 };
@@ -366,12 +366,12 @@ mod tests {
             assert!((beside - 1.0).abs() < 1e-6 || beside.is_nan());
             found += usize::from((on - 1.0).abs() > 0.02);
         }
-        // All but those outside the frame, a V that has opened, and the weakest.
+        // All but wakes outside the frame, a V that has opened, and the weakest.
         assert!(found > 40, "{found} of 60");
     }
 
-    /// What is surely found in an image is found in the image turned by a quarter, too, by the shipped network, on average with the
-    /// same score. A single score may be another one where both ends of a line could be its tip, or be 0 beside filaments.
+    /// The shipped network finds its confident detections again in the image turned by a quarter, on average with the same score.
+    /// A single score may differ where both ends of a line could be its tip, or be 0 beside filaments.
     #[test]
     fn a_quarter_turn_turns_what_is_found() {
         let model = wake_detector::Detector::pretrained(&burn::tensor::Device::flex())
@@ -392,7 +392,7 @@ mod tests {
                     let turn = (other.wake.axis_deg - one.wake.axis_deg - 90.0 + 180.0)
                         .rem_euclid(360.0)
                         - 180.0;
-                    // (column, row) goes to (383 − row, column); the network's own maps turn only nearly: the ray rule.
+                    // (column, row) goes to (383 − row, column); the network's maps turn only nearly, so the ray rule applies.
                     let apart = (other.wake.tip[0] - 383.0 + y).hypot(other.wake.tip[1] - x);
                     turn.abs() < 10.0 && apart < 60.0
                 });
@@ -402,8 +402,8 @@ mod tests {
             }
         }
         assert!(sure >= 20, "{sure} wakes");
-        // Scores scatter by a sixth of themselves, the mean of twenty by a twenty-fifth, and those above a threshold are rather
-        // the ones that were lucky upright: a tenth.
+        // Scores scatter by a sixth of themselves, the mean of twenty by a twenty-fifth, and selection by a threshold favours
+        // scores that are high by chance upright: a tenth.
         assert!(kept > 0.9 * scores, "{kept} of {scores}");
     }
 }

@@ -1,4 +1,4 @@
-//! Images to learn from, by name.
+//! Named recipes of training images.
 
 use std::sync::Arc;
 
@@ -38,7 +38,7 @@ pub enum ImageRecipe {
     Full,
 }
 
-/// What the recipe satellites is without gusts, swell, slicks, shallow water and a second ship.
+/// Removes gusts, swell, slicks, shallow water and a second ship from the recipe satellites.
 const CALM: [&str; 5] = [
     "draw.count = { one_of = [0, 1], weights = [1, 4] }",
     "draw.sea.gust_strength = 0",
@@ -46,9 +46,9 @@ const CALM: [&str; 5] = [
     "draw.sea.slick_damping = 0",
     "draw.sea.depth = \"infinite\"",
 ];
-/// And without edges.
+/// Removes the edges of turbulent wakes.
 const NO_EDGE: [&str; 1] = ["scene.ship.edge = false"];
-/// And without echo, breaking waves, sensors, responses and noise.
+/// Removes echo, breaking waves, sensors, responses and noise.
 const PLAIN: [&str; 5] = [
     "scene.ship.echo = false",
     "scene.sea.breaking = false",
@@ -58,7 +58,7 @@ const PLAIN: [&str; 5] = [
 ];
 
 impl ImageRecipe {
-    /// All of them.
+    /// All recipes.
     pub const ALL: [Self; 11] = [
         Self::Painted,
         Self::Plain,
@@ -73,7 +73,7 @@ impl ImageRecipe {
         Self::Full,
     ];
 
-    /// Its name on the command line and in reports.
+    /// Name on the command line and in reports.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -121,11 +121,11 @@ impl ImageRecipe {
 
     /// Images of `size` rows and columns.
     ///
-    /// - `device`: what the wake model computes on, for the recipe that it draws
+    /// - `device`: device of the wake model, for the recipe `Sampled`
     ///
     /// # Errors
     ///
-    /// Of the recipe or the model; the wake model draws 256 rows and columns alone.
+    /// Errors of the recipe or the model; the wake model draws only 256 rows and columns.
     pub fn source(
         self,
         seed: u64,
@@ -157,11 +157,11 @@ impl ImageRecipe {
         Ok(Arc::new(simulated(recipe, &changes.concat(), seed, size)?))
     }
 
-    /// Images of the open sea of the recipe detector, or of plain pixels: without ships and slicks.
+    /// Images of the open sea of the recipe satellites, or of the recipe plain: without ships and slicks.
     ///
     /// # Errors
     ///
-    /// Of the recipe.
+    /// Errors of the recipe.
     pub fn open_sea(plain: bool, seed: u64, size: usize) -> wake_dataset::Result<Arc<dyn Source>> {
         let changes: [&[&str]; 3] = match plain {
             true => [&CALM, &NO_EDGE, &PLAIN],
@@ -181,7 +181,7 @@ impl ImageRecipe {
     ///
     /// # Errors
     ///
-    /// Of the recipe.
+    /// Errors of the recipe.
     pub fn empty_sea(seed: u64, size: usize) -> wake_dataset::Result<Arc<dyn Source>> {
         let recipe = Recipe::detector()?;
         Ok(Arc::new(simulated(
@@ -193,7 +193,7 @@ impl ImageRecipe {
     }
 }
 
-/// The recipe detector, clear wakes more often.
+/// The recipe detector with clear wakes more often.
 fn clear(seed: u64, size: usize) -> wake_dataset::Result<Clear> {
     Ok(Clear::new(simulated(Recipe::detector()?, &[], seed, size)?))
 }

@@ -1,11 +1,11 @@
-//! The first images of a source, again and again.
+//! The first images of a source, repeated.
 
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use wake_dataset::{Pair, Source};
 
-/// A source whose first pairs are made once, kept in memory, and given again after the last.
+/// Source whose first pairs are made once, kept in memory and repeated endlessly.
 #[derive(Debug)]
 pub struct Repeated {
     source: Arc<dyn Source>,
@@ -33,14 +33,14 @@ impl Source for Repeated {
             .iter()
             .filter(|&&p| self.kept[p as usize].get().is_none());
         if let Some(&first) = missing.next() {
-            // Those of one batch at once; beyond the last the first follow, which are there by then.
+            // Makes the missing pairs of a batch at once; those wrapped around to the start usually exist by then.
             let last = missing
                 .copied()
                 .filter(|&p| p > first)
                 .max()
                 .unwrap_or(first);
             for (pair, place) in self.source.items(first..last + 1)?.into_iter().zip(first..) {
-                // Another thread made the same pair.
+                // Ignored if another thread has made the same pair.
                 let _ = self.kept[place as usize].set(pair);
             }
         }
@@ -57,7 +57,7 @@ mod tests {
     use super::*;
     use crate::detector::Painted;
 
-    /// Whatever is asked for first, and across the end.
+    /// In any order, and across the end.
     #[test]
     fn pairs_are_those_of_the_source_and_come_again() {
         let source = Painted { seed: 3, size: 32 };

@@ -1,4 +1,4 @@
-//! Images to learn from, and where the wakes are in them.
+//! Training images and their wakes.
 
 use wake_dataset::Pair;
 use wake_physics::Scene;
@@ -15,18 +15,18 @@ pub struct Sample {
     pub size: usize,
     /// Grey levels from 0 to 255, row by row.
     pub pixels: Vec<f32>,
-    /// All wakes, the weak ones too.
+    /// All wakes, including weak ones.
     pub wakes: Vec<Wake>,
 }
 
-/// Width of the line that is looked for \[pixels\].
+/// Width of a wake's line \[pixels\].
 const LINE: f64 = 16.0;
-/// How long the wake of a ship may be that is not to be seen \[pixels\], and its signal over noise: between what is to be
-/// found and what is sea.
+/// Length \[pixels\] and signal-to-noise ratio assumed for a ship's wake without a label: between wakes that count and open
+/// sea, so that it is ignored.
 const UNSURE: (f32, f32) = (80.0, 3.0);
 
 impl Sample {
-    /// One image; it is square.
+    /// Sample of a pair with a square image.
     #[must_use]
     pub fn of_pair(pair: &Pair) -> Self {
         Self {
@@ -42,7 +42,7 @@ impl Sample {
         GreyImage::from_levels(self.size, self.size, &self.pixels)
     }
 
-    /// The image as other geometries have it: mirrored, or with rows and columns exchanged.
+    /// Mirrors the sample, or exchanges its rows and columns, at random, as in other imaging geometries.
     pub(crate) fn turned(self, draw: &mut Draw) -> Self {
         let size = self.size;
         let [exchange, left_right] = [draw.chance(0.5), draw.chance(0.5)];
@@ -54,7 +54,7 @@ impl Sample {
                 .collect();
             for wake in &mut wakes {
                 wake.tip.reverse();
-                // Right becomes down: the angle from up becomes that from left, the other way round.
+                // Right becomes down, and up becomes left.
                 wake.axis_deg = (270.0 - wake.axis_deg).rem_euclid(360.0);
             }
         }
@@ -73,9 +73,9 @@ impl Sample {
     }
 }
 
-/// The wakes of a scene: those that its labels show, and those of its other ships under way, which nobody is sure of.
+/// The wakes of a scene: those with labels, and uncertain ones of all other ships under way.
 ///
-/// A wake's line begins at the stern. A scene without ships is of a painted image: its wakes are the objects alone.
+/// A wake's line begins at the stern. A scene without ships belongs to a painted image, whose wakes are the objects alone.
 pub(crate) fn wakes(objects: &[Object], scene: &Scene) -> Vec<Wake> {
     let mut seen: Vec<&Object> = objects.iter().filter(|o| o.class == Class::Wake).collect();
     let grid = &scene.grid;
@@ -111,7 +111,7 @@ pub(crate) fn wakes(objects: &[Object], scene: &Scene) -> Vec<Wake> {
     wakes
 }
 
-/// A wake that no ship of the scene has: its box begins at its tip.
+/// Wake without a ship in the scene; its box begins at its tip.
 fn painted(object: &Object, scene: &Scene) -> Wake {
     let [port, starboard, ..] = object.oriented_box_px;
     let tip = [0, 1].map(|a| 0.5 * (port[a] + starboard[a]));
@@ -125,7 +125,7 @@ fn painted(object: &Object, scene: &Scene) -> Wake {
     }
 }
 
-/// Signal over noise of the whole line, from that of a pixel.
+/// Signal-to-noise ratio of the whole line, from that of a pixel.
 ///
 /// ```text
 /// snr √(length · width / correlated pixels),   correlated pixels = resolution over spacing, at least 1, in both directions
@@ -139,7 +139,7 @@ fn line_snr(object: &Object, scene: &Scene) -> f32 {
     (snr * (object.length_px * LINE / correlated).sqrt()) as f32
 }
 
-/// What [`line_snr`] is of an image without correlation, as that of a pixel.
+/// Signal-to-noise ratio of a pixel from that of the line, the inverse of [`line_snr`] for uncorrelated pixels.
 pub(crate) fn pixel_snr(line: f32, length: f32) -> f64 {
     f64::from(line) / (f64::from(length) * LINE).sqrt()
 }
@@ -179,8 +179,8 @@ mod tests {
         }
     }
 
-    /// A scene's wake begins at the stern and runs astern, whether it is seen or not; what is seen is surer the longer it
-    /// is and the less its pixels are correlated.
+    /// A scene's wake begins at the stern and runs astern, with a label or without; the signal-to-noise ratio of a labelled one
+    /// grows with its length, and is lower for correlated pixels.
     #[test]
     fn wakes_of_a_scene_begin_at_the_stern() {
         let changes = [

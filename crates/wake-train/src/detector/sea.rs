@@ -1,9 +1,9 @@
-//! What satellite images add to the mean of a scene: mottle, fronts, correlated speckle, ships, clutter, eight bits.
+//! Effects of satellite images on the mean of a scene: mottle, fronts, correlated speckle, ships, clutter, eight bits.
 
 use super::draw::Draw;
 use wake_detector::direction;
 
-/// Speckle of an image: relative spread, and how far it is correlated.
+/// Speckle of an image: relative spread and correlation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Speckle {
     /// Standard deviation over mean, of amplitude.
@@ -13,7 +13,7 @@ pub(crate) struct Speckle {
 }
 
 impl Speckle {
-    /// Speckle as products have it: 4 to 80 equivalent looks of amplitude, lag-1 correlations from 0 to 0.9.
+    /// Draws speckle as in products: 4 to 80 equivalent looks of amplitude, lag-1 correlations from 0 to 0.9.
     pub(crate) fn draw(draw: &mut Draw) -> Self {
         let filter = [0, 1].map(|_| match draw.chance(0.3) {
             true => 0.0,
@@ -25,7 +25,7 @@ impl Speckle {
         }
     }
 
-    /// Pixels that count as one independent sample: the sum of the correlations over all lags.
+    /// Pixels per independent sample: the sum of the correlations over all lags.
     ///
     /// ```text
     /// Σ_k exp(−k²/4s²) ≈ 2 s √π,    at least 1, in each direction
@@ -62,7 +62,7 @@ impl Speckle {
         field
     }
 
-    /// Multiplies amplitudes with speckle; its skewness is that of a Gamma distribution's root, to first order.
+    /// Multiplies amplitudes by speckle; its skewness is that of a Gamma distribution's root, to first order.
     pub(crate) fn apply(&self, amplitude: &mut [f32], size: usize, draw: &mut Draw) {
         let normals = self.normals(size, draw);
         let bend = 0.35 * self.spread * self.spread;
@@ -110,7 +110,7 @@ fn smooth(size: usize, period: f32, draw: &mut Draw) -> Vec<f32> {
     field
 }
 
-/// Multiplies a mean with gusts, now and then a front, swell or a slick band.
+/// Multiplies a mean by gusts, and sometimes by a front, swell or slicks.
 pub(crate) fn mottle(mean: &mut [f32], size: usize, draw: &mut Draw) {
     let strength = match draw.chance(0.15) {
         true => draw.between(0.1, 0.3),
@@ -133,7 +133,7 @@ pub(crate) fn mottle(mean: &mut [f32], size: usize, draw: &mut Draw) {
     }
 }
 
-/// Now and then a border where nothing was measured: a mean of 0.
+/// Sometimes sets a border without data, with a mean of 0.
 pub(crate) fn border(mean: &mut [f32], size: usize, draw: &mut Draw) {
     if !draw.chance(0.06) {
         return;
@@ -177,7 +177,7 @@ fn swell(mean: &mut [f32], size: usize, draw: &mut Draw) {
     }
 }
 
-/// A winding dark or bright line without beginning or ship: what a wake is not.
+/// A winding dark or bright line without beginning or ship, unlike a wake.
 fn slick(mean: &mut [f32], size: usize, draw: &mut Draw) {
     let s = size as f32;
     let (mut x, mut y) = (draw.between(0.0, s), draw.between(0.0, s));
@@ -205,8 +205,8 @@ fn slick(mean: &mut [f32], size: usize, draw: &mut Draw) {
     }
 }
 
-/// Dark filaments that wind around eddies, as films gather in weak wind: level lines of smooth noise, some of them beside
-/// each other. Each is as narrow and as dark as the line of a wake, and none is straight for long.
+/// Dark filaments that wind around eddies, as of films in weak wind: level lines of smooth noise, some of them adjacent.
+/// Each is as narrow and as dark as the line of a wake, and none is straight for long.
 pub(crate) fn filaments(mean: &mut [f32], size: usize, draw: &mut Draw) {
     let (period, width) = (draw.scale(25.0, 110.0), draw.scale(1.0, 3.5));
     let (depth, count) = (draw.between(0.12, 0.45), 1 + draw.one_of(&[0.3, 0.4, 0.3]));
@@ -220,7 +220,7 @@ pub(crate) fn filaments(mean: &mut [f32], size: usize, draw: &mut Draw) {
             false => field[i + step] - field[i],
         };
         let slope = next(1, column + 1 == size).hypot(next(size, row + 1 == size));
-        // Some places of a filament are hardly to be seen.
+        // Some places of a filament are hardly visible.
         let here = depth / (1.0 + (-2.0 * strength[i]).exp());
         for level in &levels {
             let off = (field[i] - level) / (slope.max(0.2 / period) * width);
@@ -229,7 +229,7 @@ pub(crate) fn filaments(mean: &mut [f32], size: usize, draw: &mut Draw) {
     }
 }
 
-/// Calls `f` with every pixel within `radius` of a place, and how far right and down of it the pixel is.
+/// Calls `f` with every pixel within `radius` of a place, and its offset to the right and down.
 fn around(size: usize, [x, y]: [f32; 2], radius: f32, mut f: impl FnMut(usize, f32, f32)) {
     let bounds = |centre: f32| {
         let low = (centre - radius).ceil().clamp(0.0, size as f32);
@@ -243,7 +243,7 @@ fn around(size: usize, [x, y]: [f32; 2], radius: f32, mut f: impl FnMut(usize, f
     }
 }
 
-/// How the ships of one image look: along which axis their echo is displaced and smeared.
+/// Appearance of the ship echoes of one image, and the axis along which they are displaced and smeared.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Echoes {
     vertical: bool,
@@ -273,7 +273,7 @@ impl Echoes {
         }
     }
 
-    /// How far the echo of a ship lies from where it is, (right, down) \[pixels\].
+    /// Displacement of a ship's echo, (right, down) \[pixels\].
     pub(crate) fn shift(&self, draw: &mut Draw) -> [f32; 2] {
         let shift = self.displaced * draw.normal().abs().min(1.5) * draw.sign();
         if self.vertical {
@@ -285,7 +285,7 @@ impl Echoes {
 
     /// Adds the echo of a ship to amplitudes: a bar of bright points, displaced, with the response's cross.
     ///
-    /// - `from`: where the wake's line begins, and how far the echo is displaced; the ship lies a little ahead
+    /// - `from`: beginning of the wake's line, and displacement of the echo; the ship lies a little ahead
     /// - `axis_deg`: from the ship along its wake
     pub(crate) fn add(
         &self,
@@ -340,7 +340,7 @@ impl Echoes {
     }
 }
 
-/// Bright things that are no ships under way: ships at rest, streaks along the image's axes, land, piers.
+/// Bright objects other than ships under way: ships at rest, streaks along the image's axes, land, piers.
 pub(crate) fn clutter(mean: &mut [f32], size: usize, echoes: &Echoes, draw: &mut Draw) {
     let s = size as f32;
     for _ in 0..draw.one_of(&[0.45, 0.25, 0.15, 0.1, 0.05]) {
@@ -377,7 +377,7 @@ fn streak(mean: &mut [f32], size: usize, draw: &mut Draw) {
     });
 }
 
-/// Bright, rough ground behind a winding coast, or an islet; often in fields.
+/// Bright, rough ground behind a winding coast, or an islet; often divided into fields.
 fn land(mean: &mut [f32], size: usize, draw: &mut Draw) {
     let s = size as f32;
     let centre = [0, 1].map(|_| draw.between(-0.3, 1.3) * s);
@@ -403,10 +403,10 @@ fn land(mean: &mut [f32], size: usize, draw: &mut Draw) {
     }
 }
 
-/// Different fields in a row.
+/// Number of different fields in a row.
 const FIELDS: usize = 24;
 
-/// Straight bright lines that begin and end at once: piers, dams, rows of stakes.
+/// Straight bright lines with sharp ends: piers, dams, rows of stakes.
 fn piers(mean: &mut [f32], size: usize, draw: &mut Draw) {
     let s = size as f32;
     for _ in 0..1 + draw.one_of(&[0.4, 0.3, 0.3]) {
@@ -429,7 +429,7 @@ fn piers(mean: &mut [f32], size: usize, draw: &mut Draw) {
     }
 }
 
-/// Amplitudes as a quick-look has them: stretched by an unknown factor, cut to eight bits.
+/// Turns amplitudes into a quick-look: stretched by an unknown factor, cut to eight bits.
 pub(crate) fn quick_look(mut amplitude: Vec<f32>, draw: &mut Draw) -> Vec<f32> {
     let (gain, offset) = (draw.scale(22.0, 110.0), draw.between(-8.0, 12.0));
     for a in &mut amplitude {

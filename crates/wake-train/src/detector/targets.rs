@@ -1,4 +1,4 @@
-//! What the maps of the network should be, and the loss of what they are.
+//! Target maps of the network, and its loss.
 
 use burn::tensor::activation::{log_sigmoid, sigmoid};
 use burn::tensor::{Device, Tensor, TensorData};
@@ -8,15 +8,15 @@ use wake_detector::Wake;
 use wake_detector::network::{ANGLE_UNIT, INPUTS, LENGTH_UNIT, Map, STRIDE};
 use wake_detector::normalize;
 
-/// Wakes above this signal-to-noise are to be found; those below neither are, nor are they mistakes.
+/// Least signal-to-noise ratio of wakes that count; weaker ones are ignored, whether detected or missed.
 pub const FOUND: f32 = 5.5;
-/// Nobody can see wakes below this: they are sea.
+/// Wakes up to this signal-to-noise ratio are invisible and count as sea.
 const UNSEEN: f32 = 2.0;
 /// Standard deviation of the hill around a tip \[cells\].
 const HILL: f32 = 2.0;
 /// Half the width of a line \[cells\].
 const LINE: f32 = 1.3;
-/// Around weak wakes nothing is learned, this far \[cells\].
+/// Distance from a weak wake within which nothing is learnt \[cells\].
 const AROUND: f32 = 4.0;
 
 /// Channels of the targets.
@@ -25,10 +25,10 @@ const PEAK: usize = 1;
 const ON_LINE: usize = 2;
 /// Four directions, length and half-angle, as the network gives them.
 const VALUES: usize = 3;
-/// Weights of the same.
+/// Weights of these values on lines and at tips.
 const LINE_WEIGHT: usize = 9;
 const TIP_WEIGHT: usize = 10;
-/// Whether tips, and lines, are judged here.
+/// Masks of the cells whose tips, and lines, enter the loss.
 const TIP_JUDGED: usize = 11;
 const LINE_JUDGED: usize = 12;
 const CHANNELS: usize = 13;
@@ -50,7 +50,7 @@ fn targets(sample: &Sample) -> Vec<f32> {
 
 fn draw(maps: &mut [f32], cells: usize, wake: &Wake) {
     let area = cells * cells;
-    // Centres of cells lie 1½ pixels behind their first one.
+    // Centres of cells lie 1½ pixels from their first pixel.
     let centre = 0.5 * (STRIDE as f32 - 1.0);
     let tip = wake.tip.map(|x| (x - centre) / STRIDE as f32);
     let length = wake.length / STRIDE as f32;
@@ -95,7 +95,7 @@ fn draw(maps: &mut [f32], cells: usize, wake: &Wake) {
             put(VALUES + 1, values[0][1]);
         }
         if !tip_inside {
-            // Where the line enters the image may or may not count as its tip.
+            // The point where the line enters the image may or may not count as its tip.
             if from_line < 2.0 * AROUND {
                 put(TIP_JUDGED, 0.0);
             }
@@ -120,7 +120,7 @@ fn draw(maps: &mut [f32], cells: usize, wake: &Wake) {
     }
 }
 
-/// A batch as the network takes it, and what should come out.
+/// A batch of network inputs and their target maps.
 pub(crate) struct Batch {
     /// `[batch, INPUTS, size, size]`
     pub(crate) images: Tensor<4>,
@@ -129,7 +129,7 @@ pub(crate) struct Batch {
 }
 
 impl Batch {
-    /// Normalises images and draws their targets; all have one size.
+    /// Joins prepared images and their targets; all have one size.
     pub(crate) fn new(samples: &[Prepared], device: &Device) -> Self {
         let (count, size) = (samples.len(), samples.first().map_or(0, |s| s.size));
         let cells = size / STRIDE;
@@ -204,7 +204,7 @@ impl Batch {
     }
 }
 
-/// An image ready to be learned from.
+/// A normalised image and its targets.
 #[derive(Debug)]
 pub(crate) struct Prepared {
     size: usize,
@@ -252,7 +252,7 @@ mod tests {
         }
     }
 
-    /// Maps that say what the targets say, with logits of ±12.
+    /// Maps equal to the targets, with logits of ±12.
     fn perfect(batch: &Batch) -> Tensor<4> {
         let target = |channel: usize, count: usize| batch.targets.clone().narrow(1, channel, count);
         let logit = |x: Tensor<4>| x * 24.0 - 12.0;
@@ -277,7 +277,7 @@ mod tests {
             at(ON_LINE, 16, 24) > 0.5 && at(ON_LINE, 16, 28) < 0.5 && at(ON_LINE, 19, 15) < 0.5
         );
         assert!((at(VALUES, 16, 15) - 1.0).abs() < 1e-6 && at(VALUES + 1, 16, 15).abs() < 1e-6);
-        // A weak wake is neither: nothing is learned around it.
+        // Around a weak wake nothing is learnt.
         let weak = targets(&sample(vec![wake(4.0)]));
         let at =
             |channel: usize, row: usize, column: usize| weak[(channel * 32 + row) * 32 + column];
@@ -287,7 +287,7 @@ mod tests {
         assert!(at(TIP_JUDGED, 2, 2) > 0.5);
     }
 
-    /// Perfect maps have next to no loss; a turned direction, a forgotten tip, an invented one each cost.
+    /// Perfect maps have next to no loss; a wrong direction, a missed tip and a false tip each cost.
     #[test]
     fn the_loss_is_least_for_the_targets() {
         let device = Device::flex();

@@ -1,4 +1,4 @@
-//! The network learns from a source of images.
+//! Training of the detector.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -27,7 +27,7 @@ use crate::stage_options::{StageDefaults, StageOptions};
 use wake_detector::network::Network;
 use wake_detector::self_check::self_check;
 
-/// What a run takes where nothing else is asked for.
+/// Defaults of a run.
 const DEFAULTS: StageDefaults = StageDefaults {
     steps: 2500,
     batch: 16,
@@ -37,14 +37,14 @@ const DEFAULTS: StageDefaults = StageDefaults {
 const SIZE: usize = 256;
 /// Name of the stage, its checkpoints and its log.
 const STAGE: &str = "detector";
-/// What is written: averaged weights.
+/// File that is written: averaged weights.
 const WEIGHTS: &str = "detector.safetensors";
-/// Draws of how an image is turned are others than those of the image.
+/// Separates the random numbers of mirroring from those of the image.
 const TURNED: u64 = 0x5151;
 
-/// Learning the maps of images: hills at tips, lines, directions and extents.
+/// Task of the detector: maps with hills at tips, lines, directions and extents.
 ///
-/// An image is mirrored and turned as the geometry of other passes would.
+/// Images are mirrored and transposed at random, as in the geometry of other passes.
 #[derive(Debug)]
 pub struct DetectorTask {
     source: Arc<dyn Source>,
@@ -52,15 +52,15 @@ pub struct DetectorTask {
 }
 
 impl DetectorTask {
-    /// Learns from square images of a source.
+    /// Task on the square images of a source.
     ///
-    /// - `seed`: of how they are turned
+    /// - `seed`: seed of the mirroring
     #[must_use]
     pub fn new(source: Arc<dyn Source>, seed: u64) -> Self {
         Self { source, seed }
     }
 
-    /// The pairs at some positions, made by a thread for each core: a source makes one at a time.
+    /// Makes the pairs at some positions, with one thread per core, since a source makes one at a time.
     fn pairs(&self, positions: Range<u64>) -> Result<Vec<Pair>> {
         let threads = std::thread::available_parallelism().map_or(1, usize::from) as u64;
         let each = (positions.end - positions.start).div_ceil(threads).max(1) as usize;
@@ -82,7 +82,7 @@ impl DetectorTask {
     }
 }
 
-/// Images of a part of a step, with the maps that the network should make of them.
+/// Images of a part of a step, with their target maps.
 #[derive(Debug)]
 pub struct DetectorBatch(Vec<Prepared>);
 
@@ -118,7 +118,7 @@ pub enum TrainingImages {
     Recipe {
         /// Recipe of the images.
         recipe: ImageRecipe,
-        /// Different images, which come again when all were seen; `None`: all are different.
+        /// Number of different images, repeated endlessly; `None`: all are different.
         distinct: Option<usize>,
     },
     /// The training pairs of a folder that `wake dataset` made.
@@ -141,22 +141,23 @@ impl Default for TrainingImages {
 pub struct DetectorTraining {
     /// Training images.
     pub images: TrainingImages,
-    /// Weights to begin with; `None`: random ones.
+    /// Initial weights; `None`: random ones.
     pub weights: Option<PathBuf>,
     /// Options of the run.
     pub options: StageOptions,
 }
 
 impl DetectorTraining {
-    /// Makes all steps. Writes `detector.safetensors` (averaged weights, which
-    /// [`Detector::load`](wake_detector::Detector::load) takes), a log, `config.json`, `run.json` and `checkpoints/`; a run that
-    /// was killed goes on from its last checkpoint.
+    /// Runs the training; a killed run can be resumed from its last checkpoint.
+    ///
+    /// Writes `detector.safetensors` (averaged weights, which [`Detector::load`](wake_detector::Detector::load) reads), a log,
+    /// `config.json`, `run.json` and `checkpoints/`.
     ///
     /// # Errors
     ///
     /// As [`RunOptions::validate`]; [`wake_nn::Error::InvalidOption`] for a folder of another run;
     /// [`wake_dataset::Error::Dataset`] and [`wake_nn::Error::OutOfRange`] for a data set that cannot be learnt from;
-    /// [`wake_detector::Error::WrongMaps`] for first weights as [`Detector::load`](wake_detector::Detector::load).
+    /// [`wake_detector::Error::WrongMaps`] for initial weights as [`Detector::load`](wake_detector::Detector::load).
     pub fn train(&self, out: &Path, progress: &dyn Fn(Progress)) -> Result<()> {
         let options = &self.options;
         let mut constants = self.constants()?;
@@ -197,7 +198,7 @@ impl DetectorTraining {
         stage.train(&mut folder, run, &task, progress, show)
     }
 
-    /// The run, checked before anything is made.
+    /// Constants of the run, validated before any image is made.
     fn constants(&self) -> Result<RunOptions> {
         let mut constants = self.options.run(&DEFAULTS, Value::Null);
         let trainer = &mut constants.trainer;
@@ -213,7 +214,7 @@ impl DetectorTraining {
 }
 
 impl TrainingImages {
-    /// The pairs, and what a run notes of them.
+    /// Source of the pairs, and their identity for the record of a run.
     fn source(&self, options: &StageOptions) -> Result<(Arc<dyn Source>, Value)> {
         let seed = options.seed;
         Ok(match self {

@@ -1,4 +1,4 @@
-//! Kinds of images from a constant to the simulator's: the shape of the sea in each, and whether a classifier tells it from simulated ones.
+//! Ablation over kinds of images, from a constant to the simulator's: shape of the sea, and classifier two-sample tests.
 
 use burn::tensor::Device;
 use serde::Serialize;
@@ -23,7 +23,7 @@ const SQUARE: usize = 8;
 pub struct AblationRow {
     /// Kind of image.
     pub image: &'static str,
-    /// Skewness of the grey that is left when the expected image is subtracted; 0 of a Gaussian field.
+    /// Skewness of grey less the expected image; 0 for a Gaussian field.
     pub skewness: Option<f64>,
     /// Excess kurtosis of the same.
     pub kurtosis: Option<f64>,
@@ -35,17 +35,17 @@ pub struct AblationRow {
     pub crest_variance: Option<f64>,
     /// Squared differences of neighbours across the borders of the model's squares over those elsewhere.
     pub seams: Option<f64>,
-    /// Slope of the grey on that of the expected image inside the Kelvin wedge: 1 where the wake has the contrast of the physics, 0
+    /// Slope of grey against the expected image inside the Kelvin wedge: 1 where the wake has the contrast of the physics, 0
     /// without a wake.
     pub wake_contrast: Option<f64>,
-    /// Against simulated images of the same scenes, see [`classifier_two_sample_test`](crate::classifier_two_sample_test).
+    /// Test against simulated images of the same scenes, see [`classifier_two_sample_test`](crate::classifier_two_sample_test).
     pub two_sample: Option<TwoSample>,
 }
 
-/// The figures of every kind of image, and last of the simulated images that they are compared with, which have a third sea.
+/// Rows of every kind of image, and last of the simulated images that they are compared with, which have a third sea.
 ///
 /// - `kinds`: names and sources, conditioned on sentence and numbers
-/// - `device`: of the classifier, one without autodiff
+/// - `device`: device of the classifier, without autodiff
 /// - `step`: called once before the first kind, and after each
 ///
 /// # Errors
@@ -62,14 +62,14 @@ pub(super) fn ablation(
         let images = view.draw_all(source, scenes, Told::Both, |_| {})?;
         Ok(images.iter().map(|image| view.grey(image)).collect())
     };
-    // The mean over all seas has no speckle, whatever the images have.
+    // The expected image has no speckle, even where the images do.
     let plain = View {
         speckle: false,
         ..*view
     };
     let expected = plain.draw_all(&Baseline::Expected, scenes, Told::Both, |_| {})?;
     let expected: Vec<Field> = expected.iter().map(|image| view.grey(image)).collect();
-    // Neither the sea that pixels are compared with nor that of the rung of the simulator.
+    // A sea other than those of the pixel comparison and of the simulator among the kinds.
     let third: Vec<Scene> = scenes.iter().map(|scene| other_sea(scene, 2)).collect();
     let simulated = draw(&Baseline::Simulator, &third)?;
     step();
@@ -122,8 +122,8 @@ fn row(
     }
 }
 
-/// Slope of an image on the expected one inside the Kelvin wedge, by least squares; `None` without a ship or where nothing is
-/// expected.
+/// Slope of an image against the expected one inside the Kelvin wedge, by least squares; `None` without a ship or for a flat
+/// expected image.
 fn wake_contrast(scene: &Scene, image: &Field, expected: &Field) -> Option<f64> {
     let inside = wedge(scene).ok()?;
     let within = |field: &Field| -> Vec<f64> {
@@ -144,7 +144,7 @@ fn wake_contrast(scene: &Scene, image: &Field, expected: &Field) -> Option<f64> 
 mod tests {
     use super::*;
 
-    /// Half the contrast around another mean, with a sea that knows nothing of the wake: one half.
+    /// Half the contrast around another mean gives a slope of one half.
     #[test]
     fn the_contrast_of_a_wake_is_a_slope() {
         let keys = ["grid.rows = 64", "grid.columns = 64"];

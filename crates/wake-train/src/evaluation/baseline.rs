@@ -1,4 +1,4 @@
-//! Images without a network, which a model has to be better than, or as good as.
+//! Baselines: images made without a network, to compare a model with.
 
 use wake_physics::{Field, LinearSea, Scene, expected_intensity, simulate};
 
@@ -11,11 +11,11 @@ use wake_nn::noise::NoiseSource;
 pub enum Baseline {
     /// The same value everywhere: the mean of the expected image.
     Constant,
-    /// The mean over all seas, by physics: no sea.
+    /// The mean over all seas, computed by physics.
     Expected,
-    /// That mean times the exponential of a Gaussian sea with the linear spectrum of the image.
+    /// The expected image times the exponential of a Gaussian sea with the linear spectrum of the image.
     Gaussian,
-    /// The simulator with another random sea, of the seed `!scene.seed`: what a perfect model would be.
+    /// The simulator with another random sea, of the seed `!scene.seed`: as good as a perfect model.
     OtherSea,
     /// The simulator.
     Simulator,
@@ -70,7 +70,7 @@ impl ImageSource for Baseline {
     }
 }
 
-/// What a Gaussian sea g with the linear spectrum of the image makes of the expected intensity: a factor of mean 1.
+/// Factor of mean 1 by which a Gaussian sea g with the linear spectrum of the image modulates the expected intensity.
 ///
 /// ```text
 /// exp(g − ⟨g²⟩/2)
@@ -91,7 +91,7 @@ pub(super) fn gaussian_sea(scene: &Scene) -> wake_physics::Result<Field> {
 mod tests {
     use super::*;
 
-    /// Constants and other seas are made of the images that they are said to be made of.
+    /// The constant has the mean of the expected image, and the other sea the seed `!scene.seed`.
     #[test]
     fn baselines_follow_from_each_other() {
         let keys = ["grid.rows = 32", "grid.columns = 32", "seed = 3"];

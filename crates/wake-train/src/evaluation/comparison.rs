@@ -1,4 +1,4 @@
-//! A model's images beside the simulator's of the same scenes: pixels, what is read from them, and speckle.
+//! Comparison of a model's images with the simulator's of the same scenes: pixels, measured values and speckle.
 
 use wake_physics::measure::open_sea;
 use wake_physics::sar::speckle::speckle;
@@ -21,11 +21,11 @@ const KINDS: [&str; 4] = [
     "blurred simulator",
 ];
 
-/// Figures over scenes, which are added some at a time.
+/// Figures over scenes, added batch by batch.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Comparison {
     view: View,
-    /// The model, the kinds in [`KINDS`], and whatever stands beside.
+    /// Tallies of the model, of the kinds in [`KINDS`], and of other sources.
     tallies: Vec<PixelTally>,
     /// Values measured in simulated images, scene by scene.
     pub simulated: Vec<Reading>,
@@ -37,7 +37,7 @@ pub(super) struct Comparison {
 }
 
 impl Comparison {
-    /// Nothing yet.
+    /// Empty comparison.
     pub(super) fn new(view: View) -> Self {
         Self {
             view,
@@ -45,15 +45,15 @@ impl Comparison {
         }
     }
 
-    /// Draws scenes in every way and counts the images against simulated ones.
+    /// Draws scenes from all sources and compares the images with simulated ones.
     ///
     /// - `model`: the source to evaluate, conditioned on sentence and numbers
-    /// - `beside`: other sources, whose pixels count alone
+    /// - `beside`: other sources, of which only pixels are compared
     ///
     /// # Errors
     ///
     /// As [`ImageSource::draw`] and [`Reading::of`], and [`wake_nn::Error::InvalidOption`] for a source that
-    /// gives other images than were asked for.
+    /// returns images of a wrong number or size.
     pub(super) fn add(
         &mut self,
         scenes: &[Scene],
@@ -95,9 +95,9 @@ impl Comparison {
         Ok(())
     }
 
-    /// The figures of pixels: of the model first, of the simulator with another sea second, of other sources last.
+    /// Pixel figures: the model first, the simulator with another sea second, other sources last.
     ///
-    /// - `model`: its name
+    /// - `model`: name of the model
     #[must_use]
     pub(super) fn pixels(&self, model: &str, beside: &[Named<'_>]) -> Vec<PixelRow> {
         let names = [model].into_iter().chain(KINDS);
@@ -106,7 +106,7 @@ impl Comparison {
         rows.map(|(tally, name)| tally.row(name)).collect()
     }
 
-    /// Equivalent looks of the open sea after speckle is applied, medians over the scenes: on simulated images, and on the
+    /// Equivalent number of looks of the open sea with speckle, medians over the scenes: on simulated images, and on the
     /// model's.
     #[must_use]
     pub(super) fn looks(&self) -> [Option<f64>; 2] {
@@ -142,7 +142,7 @@ mod tests {
         assert!((looks / expected - 1.0).abs() < 0.05, "{looks}");
     }
 
-    /// The simulator in the place of the model: nothing is between its image and the reference.
+    /// With the simulator as the model, its image equals the reference.
     #[test]
     fn a_model_that_is_the_simulator_has_its_pixels() {
         let keys = ["grid.rows = 32", "grid.columns = 32"];

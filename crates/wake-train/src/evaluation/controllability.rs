@@ -1,4 +1,4 @@
-//! One number of the scene is changed; the value measured in the image must follow.
+//! Controllability: one value of a scene is changed, and the value measured in the image must follow.
 
 use serde::Serialize;
 use wake_physics::Scene;
@@ -16,19 +16,21 @@ pub struct ControllabilityRow {
     pub quantity: &'static str,
     /// Inputs of the source: "both", "text", "numbers" or "paraphrase"; "simulator" for the simulator with another sea.
     pub told: &'static str,
-    /// Pairs that were drawn.
+    /// Number of scenes, each the base of a pair.
     pub pairs: usize,
-    /// Pairs in which the value follows on simulated images: those that count.
+    /// Pairs in which the value follows on simulated images; only these count.
     pub counted: usize,
     /// Share of the counted pairs in which it follows on generated images, or on simulated ones of other seas.
     pub right: Option<f64>,
 }
 
-/// Changes a quantity of each scene, draws both, and counts how often what is read from the images follows: of the simulator with
-/// another sea first, then of the model for each of `told`.
+/// Changes a quantity of each scene, draws both scenes, and counts how often the measured value follows.
 ///
-/// Values move by a fixed step toward the other end of the paper's range (ship 6 to 12 m/s, wind 3 to 7 m/s, incidence 16 to 32°),
-/// headings by 60°, winds by 40°, fetches to three times or a third. Scenes whose ship would have to change but is not there do not count.
+/// The first row is that of the simulator with another sea; the others are those of the model for each of `told`.
+///
+/// Values move by a fixed step toward the other end of the paper's range (ship 6 to 12 m/s, wind 3 to 7 m/s, incidence 16 to
+/// 32°), headings by 60°, wind directions by 40°, fetches to three times or a third. Scenes without the ship to be changed do
+/// not count.
 ///
 /// - `scenes`: bases of the pairs, with values in those ranges
 /// - `step`: called after each scene
@@ -77,7 +79,7 @@ pub(super) fn controllability(
 struct Swap {
     quantity: Quantity,
     scenes: [Scene; 2],
-    /// By how much the value of the second is larger.
+    /// Value of the second scene less that of the first.
     change: f64,
 }
 
@@ -96,7 +98,7 @@ impl Swap {
             Quantity::WindSpeed => toward(3.0, 7.0, 2.0),
             Quantity::WindDirection => 40.0,
             Quantity::Incidence => toward(16.0, 32.0, 8.0),
-            // Three times as much or a third: seas grow with the logarithm.
+            // Three times or a third: seas vary with the logarithm of the fetch.
             Quantity::Fetch if before < 26.0 => 2.0 * before,
             Quantity::Fetch => -before / 1.5,
         };
@@ -117,9 +119,9 @@ impl Swap {
         })
     }
 
-    /// Whether the measured value moves the way the scene's did; not where either image does not show it.
+    /// Whether the measured value changes in the same direction as the scene's; false where one image does not show it.
     ///
-    /// Both images are read with the base's other values given: they differ in nothing else.
+    /// Both images are measured with the base's other values given: they differ in nothing else.
     fn is_followed(&self, view: &View, source: &dyn ImageSource, told: Told) -> Result<bool> {
         let images = view.draw(source, &self.scenes, told)?;
         let read = |n: usize| -> Result<Option<f64>> {
@@ -138,7 +140,7 @@ impl Swap {
 mod tests {
     use super::*;
 
-    /// Values stay in the paper's ranges, and one of them moves alone, by what is said.
+    /// Only one value changes, by the stated amount, and stays in the paper's range.
     #[test]
     fn one_value_moves_and_stays_in_its_range() {
         for (heading, speed, wind) in [(10.0, 6.5, 3.5), (350.0, 11.5, 6.5)] {

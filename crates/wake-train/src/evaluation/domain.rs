@@ -1,4 +1,4 @@
-//! How like simulated images others are over all scenes of a recipe, before speckle and with it.
+//! Similarity of images to simulated ones over all scenes of a recipe, before speckle and with it.
 
 use std::time::Instant;
 
@@ -23,7 +23,7 @@ pub struct DomainRow {
     pub before_speckle: Option<TwoSample>,
     /// The same with the speckle of each scene's radar.
     pub with_speckle: Option<TwoSample>,
-    /// Seconds of one image on all cores, speckle apart.
+    /// Seconds per image on all cores, without speckle.
     pub seconds: f64,
 }
 
@@ -34,12 +34,12 @@ pub struct Views {
     pub plain: Vec<Field>,
     /// With the speckle of each scene's radar, as a user of a data set sees them.
     pub speckled: Vec<Field>,
-    /// Seconds of one image on all cores, speckle apart.
+    /// Seconds per image on all cores, without speckle.
     pub seconds: f64,
 }
 
 impl Views {
-    /// Draws scenes, given as a whole.
+    /// Draws images of scenes, conditioned on the whole scene.
     ///
     /// - `step`: called with the number of images after each batch
     ///
@@ -60,7 +60,7 @@ impl Views {
 
     /// Two-sample tests of these images against simulated ones of the same scenes and other seas.
     ///
-    /// - `device`: of the classifier, one without autodiff
+    /// - `device`: device of the classifier, without autodiff
     ///
     /// # Errors
     ///

@@ -27,9 +27,9 @@ pub struct EstimatedImage {
     pub misfit: f64,
     /// Log-likelihood ratio to the open sea.
     pub over_open_sea: f64,
-    /// Seconds of the estimate, times the threads that it had.
+    /// Seconds of the estimate times the number of its threads.
     pub seconds: f64,
-    /// Error, standard deviation and Cramér–Rao bound of each of [`Parameter::OF_WAKE`]; `None` where the image does not tell the value.
+    /// Error, standard deviation and Cramér–Rao bound of each of [`Parameter::OF_WAKE`]; `None` where not finite.
     pub values: Vec<[Option<f64>; 3]>,
     /// Errors of `wake_physics::measure` on the same image: heading \[deg\] and speed \[m/s\].
     pub measured: [Option<f64>; 2],
@@ -37,7 +37,7 @@ pub struct EstimatedImage {
     pub sighted: f64,
 }
 
-/// An image to estimate, and what is known of it.
+/// An image to estimate, with its truth and the inputs of the estimate.
 #[derive(Debug, Clone)]
 pub struct ToEstimate {
     /// Number in its set.
@@ -46,13 +46,13 @@ pub struct ToEstimate {
     pub truth: Scene,
     /// Intensity with speckle.
     pub image: Field,
-    /// The scene as the estimator knows it.
+    /// Scene given to the estimator.
     pub known: Scene,
-    /// Place and heading of the wake before the estimate.
+    /// Initial place and heading of the wake.
     pub sighting: Sighting,
-    /// Calibration and knowledge of the texture.
+    /// Priors on calibration and texture.
     pub priors: Priors,
-    /// Begin at the true scene, without a search.
+    /// Whether to start from the true scene, without a search.
     pub from_truth: bool,
 }
 
@@ -99,7 +99,7 @@ impl ToEstimate {
     }
 }
 
-/// Estimated less true value; of the wind's direction the error of its axis, of factors the logarithm.
+/// Estimated less true value; for the wind direction the error of its axis, for factors the logarithm.
 fn error(found: &Estimate, truth: &Scene, parameter: Parameter) -> f64 {
     let [value, _] = found.of(parameter);
     match parameter {
@@ -122,13 +122,13 @@ pub struct EstimateRow {
     pub median: Option<f64>,
     /// 90th percentile of the absolute error.
     pub percentile_90: Option<f64>,
-    /// Share of the errors within 1, 2 and 3 standard deviations; of a Gaussian 0.683, 0.954 and 0.997.
+    /// Share of the errors within 1, 2 and 3 standard deviations; for a Gaussian 0.683, 0.954 and 0.997.
     pub within: Option<[f64; 3]>,
     /// Mean over the images of squared error over squared Cramér–Rao bound; 1 for an efficient estimate.
     pub over_bound: Option<f64>,
     /// Median of the standard deviation over the bound.
     pub deviation_over_bound: Option<f64>,
-    /// Images by Φ(error/deviation) in tenths: even for exact error bars.
+    /// Histogram of Φ(error/deviation) in tenths: flat for exact error bars.
     pub ranks: [usize; 10],
 }
 
@@ -229,7 +229,7 @@ mod tests {
         }
     }
 
-    /// Errors of 1, −3 and 5 with deviations of 2 and bounds of 1; an image that is not identifiable does not count.
+    /// Errors of 1, −3 and 5 with deviations of 2 and bounds of 1; an image that is not identifiable is ignored.
     #[test]
     fn rows_count_identifiable_images() {
         let images = [

@@ -18,7 +18,7 @@ use super::wake_correlation::{WakeCorrelation, wake_correlation};
 use crate::error::Result;
 use crate::metrics::Lpips;
 
-/// First index of the scenes whose values are changed: apart from those of the other figures.
+/// First index of the scenes whose values are changed, apart from those of the other figures.
 const FIRST_CHANGED: u64 = 1 << 20;
 
 /// A source of images to evaluate, and the number of scenes.
@@ -28,7 +28,7 @@ pub struct Evaluation<'a> {
     pub source: &'a dyn ImageSource,
     /// Its name in the report.
     pub name: &'static str,
-    /// Whether it is a model, not the simulator in its place.
+    /// Whether the source is a model, and not the simulator itself.
     pub has_network: bool,
     /// Other sources, whose pixels and sea are compared too.
     pub beside: Vec<Named<'a>>,
@@ -38,7 +38,7 @@ pub struct Evaluation<'a> {
     pub view: View,
     /// Conditions to evaluate besides sentence and numbers together; none for the simulator.
     pub conditions: Vec<Told>,
-    /// Scenes; some figures take a share of them.
+    /// Number of scenes; some figures use a part of them.
     pub scenes: usize,
 }
 
@@ -49,19 +49,19 @@ pub struct Figures {
     pub judged: &'static str,
     /// Number of scenes.
     pub scenes: usize,
-    /// Pixel by pixel beside simulated images.
+    /// Pixel figures against simulated images.
     pub pixels: Vec<PixelRow>,
-    /// From the dumbest image to the simulator's.
+    /// Kinds of images from a constant to the simulator's.
     pub ablation: Vec<AblationRow>,
-    /// Speckle after it is applied.
+    /// Equivalent number of looks.
     pub speckle: Speckle,
-    /// Mean images of a wake over many seas.
+    /// Correlation of mean images of a wake over many seas.
     pub wake_correlation: WakeCorrelation,
     /// Values measured in the images.
     pub measurements: Vec<MeasurementRow>,
-    /// The same under other conditions.
+    /// Measured values under other conditions.
     pub conditions: Vec<ConditionRow>,
-    /// Whether images follow a value that is changed.
+    /// Shares of images that follow a changed value.
     pub controllability: Vec<ControllabilityRow>,
 }
 
@@ -72,7 +72,7 @@ pub struct Speckle {
     pub looks: u32,
     /// In simulated images.
     pub simulator: Option<f64>,
-    /// In those of the source.
+    /// In the images of the source.
     pub model: Option<f64>,
 }
 
@@ -81,7 +81,7 @@ pub struct Speckle {
 pub struct ConditionRow {
     /// Inputs of the source.
     pub told: &'static str,
-    /// Values measured in its images then.
+    /// Values measured in its images under this condition.
     pub measurements: Vec<MeasurementRow>,
 }
 
@@ -95,7 +95,7 @@ impl std::fmt::Debug for Evaluation<'_> {
 }
 
 impl<'a> Evaluation<'a> {
-    /// Kinds of images from the dumbest upward, without the simulator's own.
+    /// Kinds of images from the simplest upward, without the simulator's own.
     #[must_use]
     pub fn kinds(&self) -> Vec<Named<'a>> {
         let baseline = |of: &'static Baseline| (of.name(), of as &dyn ImageSource);
@@ -133,11 +133,11 @@ impl<'a> Evaluation<'a> {
         (self.scenes + 8 * self.wake_scenes() + conditions + pairs + kinds) as u64
     }
 
-    /// Draws everything and counts.
+    /// Draws all images and computes all figures.
     ///
-    /// - `lpips`: compares pixels as the paper does, if it is there
-    /// - `device`: of the classifiers, one without autodiff
-    /// - `step`: called with the name of a part, and how much more of it is done
+    /// - `lpips`: perceptual distance for the pixel figures, as in the paper; left out if `None`
+    /// - `device`: device of the classifiers, without autodiff
+    /// - `step`: called with the name of a part and the number of its steps just done
     ///
     /// # Errors
     ///
@@ -145,7 +145,7 @@ impl<'a> Evaluation<'a> {
     ///
     /// # Panics
     ///
-    /// Without any scene.
+    /// When there is no scene.
     pub fn figures(
         &self,
         lpips: Option<&Lpips>,
@@ -215,7 +215,7 @@ impl<'a> Evaluation<'a> {
         Ok(all)
     }
 
-    /// Pairs of scenes of which one value is changed.
+    /// Controllability of all quantities.
     fn controllability(&self, step: &dyn Fn(&'static str, u64)) -> Result<Vec<ControllabilityRow>> {
         let told = [&[Told::Both][..], &self.conditions].concat();
         let mut rows = Vec::new();

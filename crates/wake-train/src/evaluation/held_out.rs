@@ -1,4 +1,4 @@
-//! Scenes that no training set holds.
+//! Held-out scenes, which no training set contains.
 
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
@@ -8,15 +8,15 @@ use wake_physics::scene::Ship;
 /// First seed of the scenes: data sets count theirs from small numbers.
 const FIRST_SEED: u64 = 0xE7A1_0000_0000_0000;
 
-/// Scenes whose values lie anywhere in the ranges of the paper's grid, as exact as a prompt states them.
+/// Scenes whose values lie anywhere in the ranges of the paper's grid, rounded as in prompts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeldOut {
-    /// Every value that no prompt states, the pixels included; of its ships the first counts.
+    /// All values that no prompt states, including the grid; only the first ship is used.
     pub base: Scene,
 }
 
 impl Default for HeldOut {
-    /// Those of the wake model: 256 × 256 pixels of 4 m.
+    /// Scenes of the wake model: 256 × 256 pixels of 4 m.
     fn default() -> Self {
         let mut base = Scene::default();
         (base.grid.rows, base.grid.columns, base.grid.spacing) = (256, 256, 4.0);
@@ -25,7 +25,7 @@ impl Default for HeldOut {
 }
 
 impl HeldOut {
-    /// The scene of an index.
+    /// Scene number `index`.
     #[must_use]
     pub fn scene(&self, index: u64) -> Scene {
         let seed = FIRST_SEED + (index << 16);
@@ -47,7 +47,7 @@ impl HeldOut {
         scene
     }
 
-    /// Some scenes from the first index.
+    /// `count` scenes from the first index.
     #[must_use]
     pub fn scenes(&self, first: u64, count: usize) -> Vec<Scene> {
         let indices = first..first + count as u64;

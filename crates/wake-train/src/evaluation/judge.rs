@@ -1,4 +1,4 @@
-//! Two kinds of images, classified: the best of a few two-sample tests.
+//! Classifier two-sample test of two kinds of images, the best of a few.
 
 use burn::tensor::Device;
 use wake_physics::Field;
@@ -6,18 +6,18 @@ use wake_physics::Field;
 use crate::error::Result;
 use crate::{TwoSample, TwoSampleOptions, classifier_two_sample_test};
 
-/// Networks that are trained to tell two kinds of images apart, if those before were right less often than [`FOUND`]: one that
-/// finds nothing proves little.
+/// Largest number of classifiers; another is trained while none has an accuracy above [`FOUND`], since a single failed
+/// training proves little.
 const NETWORKS: u64 = 3;
 const FOUND: f64 = 0.9;
 /// Side of the smallest patches of a test [pixels].
 const SMALLEST: usize = 16;
 
-/// What the network that tells two kinds of images apart best says of them, the best of up to three
-/// [`classifier_two_sample_test`] tests of their default options with seeds of their own; `None` of less than four images and of images below 16 pixels.
+/// Result of the most accurate of up to three [`classifier_two_sample_test`] tests, of default options and different seeds;
+/// `None` for fewer than four images, and for images below 16 pixels.
 ///
-/// - `first`, `second`: images of one size, as many of both kinds; image k of both may show the same scene
-/// - `device`: one that holds no gradients
+/// - `first`, `second`: images of one size, equally many of both kinds; image k of both may show the same scene
+/// - `device`: device without autodiff
 ///
 /// # Errors
 ///

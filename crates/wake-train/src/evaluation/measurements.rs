@@ -1,4 +1,4 @@
-//! Errors of what is read, over many scenes.
+//! Errors of measured values over many scenes.
 
 use serde::Serialize;
 use wake_physics::Scene;
@@ -9,14 +9,14 @@ use super::statistics::AbsoluteErrors;
 /// One quantity over all scenes.
 #[derive(Debug, Clone, Serialize)]
 pub struct MeasurementRow {
-    /// Its name.
+    /// Name of the quantity.
     pub quantity: &'static str,
     /// Its unit.
     pub unit: &'static str,
-    /// The measurement on simulated images: its own error.
+    /// Errors on simulated images: those of the measurement itself.
     pub simulator: AbsoluteErrors,
-    /// On generated images, over the scenes in which it is measurable on the simulated one; what is not measurable
-    /// there is a miss.
+    /// Errors on generated images, over the scenes in which the value is measurable on the simulated image; a value that is
+    /// not measurable on the generated one is a miss.
     pub model: Option<AbsoluteErrors>,
     /// Likewise on the expected image with a Gaussian sea.
     pub gaussian: Option<AbsoluteErrors>,
@@ -60,7 +60,7 @@ mod tests {
     use super::*;
     use wake_physics::measure::Measured;
 
-    /// Of two scenes the simulator's image shows the speed in one: the model is judged there alone, and misses it.
+    /// The speed is measurable in the simulated image of one of two scenes: only there is the model scored, and it misses.
     #[test]
     fn the_model_is_judged_where_the_simulator_shows_the_value() {
         let scenes = vec![Scene::default(); 2];

@@ -1,4 +1,4 @@
-//! How good generated images are: every figure beside the simulator's own.
+//! Evaluation of generated images, with every figure beside the simulator's own.
 //!
 //! ```text
 //! scenes ─► ImageSource ─► intensity ─► readings of heading, speed, wind, fetch and incidence ─► rows of errors, controllability
@@ -6,12 +6,12 @@
 //! real images ─► pairs of windows ─► kinds of sea ─► rows
 //! ```
 //!
-//! Two simulated images of one scene are unlike each other, for their seas are random. So every figure stands beside that
-//! of a second simulated image, of the physics without a network ([`Baseline`]), of a constant image and of a blurred one: good is
-//! what comes as close to a simulated image as another simulated image does.
+//! Two simulated images of one scene differ, since their seas are random. So every figure stands beside those of a second
+//! simulated image, of the physics without a network ([`Baseline`]), of a constant image and of a blurred one: a model is good
+//! if its images are as close to a simulated image as another simulated image is.
 //!
-//! Every type whose name ends in `Row` is a line of a report, and is serialized under the names of its fields. Whatever draws
-//! images can be evaluated, see [`ImageSource`]:
+//! Every type whose name ends in `Row` is a line of a report, serialized under the names of its fields. Any [`ImageSource`] can
+//! be evaluated:
 //!
 //! ```
 //! use wake_train::evaluation::{Baseline, ImageSource, Quantity, Reading, Told};
@@ -24,7 +24,7 @@
 //! # Ok::<(), wake_train::Error>(())
 //! ```
 
-// What is judged, and what beside it.
+// Sources of images.
 mod baseline;
 mod held_out;
 mod source;

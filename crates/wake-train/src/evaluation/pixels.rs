@@ -50,7 +50,7 @@ pub struct PixelRow {
     pub ssim: Option<f64>,
     /// Peak signal-to-noise ratio of range 1, mean over scenes \[dB\].
     pub psnr_db: Option<f64>,
-    /// Perceptual distance, mean over scenes; `None` without its networks.
+    /// Perceptual distance, mean over scenes; `None` without LPIPS weights.
     pub lpips: Option<f64>,
     /// Mean grey less the reference's, mean over scenes \[1\].
     pub brightness_difference: Option<f64>,
@@ -58,7 +58,7 @@ pub struct PixelRow {
     pub contrast_ratio: Option<f64>,
     /// Largest difference of the mean radial spectrum up to half the Nyquist frequency \[dB\].
     pub spectrum_db: Option<f64>,
-    /// The difference, ring by ring \[dB\].
+    /// Difference of the mean radial spectrum, ring by ring \[dB\].
     pub spectrum_curve_db: Vec<f64>,
     /// Power of the image's rings, mean over scenes \[dB\].
     pub power_db: Vec<f64>,
@@ -83,7 +83,7 @@ impl PixelRow {
 }
 
 impl PixelTally {
-    /// Counts an image against its reference, both grey and as large as all others.
+    /// Adds an image and its reference, both grey and as large as all others.
     ///
     /// # Panics
     ///
@@ -110,7 +110,7 @@ impl PixelTally {
         }
     }
 
-    /// The means.
+    /// Means over all images.
     #[must_use]
     pub(super) fn row(&self, image: &str) -> PixelRow {
         let count = self.ssim.len().max(1) as f64;

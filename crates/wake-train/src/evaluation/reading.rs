@@ -1,4 +1,4 @@
-//! What is read from an image, against what its scene says.
+//! Values measured in an image, against those of its scene.
 
 use wake_physics::measure::{
     Measured, ShipPlace, angle_between, axis_between, fetch, incidence, measure_wake, open_sea,
@@ -14,11 +14,11 @@ use crate::error::Result;
 pub enum Quantity {
     /// Heading of the scene's first ship \[deg clockwise from azimuth\].
     Heading,
-    /// Its speed \[m/s\].
+    /// Speed of that ship \[m/s\].
     Speed,
     /// Wind speed \[m/s\].
     WindSpeed,
-    /// Where the wind blows to, which an image shows to 180° \[deg clockwise from azimuth\].
+    /// Direction the wind blows to, measurable to 180° \[deg clockwise from azimuth\].
     WindDirection,
     /// Incidence \[deg\].
     Incidence,
@@ -26,7 +26,7 @@ pub enum Quantity {
     Fetch,
 }
 
-/// Not measured.
+/// Value that is not measured.
 const NOTHING: Measured = Measured {
     value: f64::NAN,
     confidence: 0.0,
@@ -57,7 +57,7 @@ impl Quantity {
         }
     }
 
-    /// Its value in a scene; `None` of a ship that is not there.
+    /// True value in a scene; `None` for a ship that is not there.
     #[must_use]
     pub fn truth(self, scene: &Scene) -> Option<f64> {
         match self {
@@ -81,7 +81,7 @@ impl Quantity {
     }
 }
 
-/// All that was read from one image.
+/// All values measured in one image.
 #[derive(Debug, Clone, Copy)]
 pub struct Reading {
     /// In the order of [`Quantity::ALL`].
@@ -89,8 +89,10 @@ pub struct Reading {
 }
 
 impl Reading {
-    /// Reads an image of intensity before speckle. Brightness is read with the scene's other values given, the wake with the
-    /// place of its first ship; without a ship neither heading nor speed is measurable.
+    /// Measures an image of intensity before speckle.
+    ///
+    /// Wind, incidence and fetch are measured with the scene's other values given, the wake with the place of its first ship;
+    /// without a ship neither heading nor speed is measurable.
     ///
     /// # Errors
     ///
@@ -99,7 +101,7 @@ impl Reading {
         Self::read(image, scene, 0.0)
     }
 
-    /// Reads an image of intensity with the speckle of the scene's radar.
+    /// Measures an image of intensity with the speckle of the scene's radar.
     ///
     /// # Errors
     ///
@@ -108,7 +110,7 @@ impl Reading {
         Self::read(image, scene, 1.0 / f64::from(scene.radar.looks.max(1)))
     }
 
-    /// - `speckle`: its variance over its squared mean \[1\]
+    /// - `speckle`: variance of the speckle over its squared mean \[1\]
     fn read(image: &Field, scene: &Scene, speckle: f64) -> Result<Self> {
         let raster = raster(scene);
         let ship = scene.ships.first();
@@ -119,7 +121,7 @@ impl Reading {
         });
         let [wind, axis, angle, fetch] = match &open_sea(image, &raster, seen) {
             Some(sea) => {
-                // Speckle multiplies: 1 + c² is a product of both.
+                // Speckle is multiplicative: 1 + c² is the product of those of sea and speckle.
                 let squared = (1.0 + sea.contrast.powi(2)) / (1.0 + speckle) - 1.0;
                 let fetch = fetch(squared.max(0.0).sqrt(), scene)?;
                 [
@@ -154,12 +156,12 @@ impl Reading {
     }
 }
 
-/// The pixels of a scene.
+/// Raster of a scene's image.
 pub(super) fn raster(scene: &Scene) -> Raster {
     Raster::image(scene.grid.rows, scene.grid.columns, scene.grid.spacing)
 }
 
-/// What the wake of a ship is measured with.
+/// Inputs to measure the wake of a ship.
 pub(super) fn place(ship: &Ship, scene: &Scene) -> ShipPlace {
     ShipPlace {
         position: ship.position,
@@ -198,7 +200,7 @@ mod tests {
             assert!(!reading.value(quantity).measurable);
             assert!(reading.error(quantity, &scene).is_none());
         }
-        // Of a constant the brightness is exactly that of the wind, up to the curve's interpolation.
+        // The brightness of a constant is exactly that of the wind, up to the curve's interpolation.
         let error = reading.error(Quantity::WindSpeed, &scene);
         assert!(error.is_some_and(|error| error < 0.3), "{reading:?}");
     }

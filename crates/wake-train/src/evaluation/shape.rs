@@ -1,19 +1,19 @@
-//! What tells a sea from a Gaussian field of the same spectrum: skewed values, steep fronts, groups.
+//! Statistics that distinguish a sea from a Gaussian field of the same spectrum: skewness, steep fronts, groups.
 
 use wake_physics::Field;
 use wake_physics::measure::smooth;
 
-/// Standard deviation of the bell over which local energy is taken \[pixels\]: chosen, some wavelengths of an image of 4 m
+/// Standard deviation of the Gaussian window of local energy \[pixels\]: chosen, some wavelengths of an image of 4 m
 /// pixels.
 const BELL: f64 = 8.0;
 
-/// Share of the pixels that count as crests of an expected image, and as its troughs: chosen.
+/// One pixel in so many counts as a crest of an expected image, and one as a trough: chosen.
 const QUARTER: usize = 4;
 
 /// Moments of a field beyond its spectrum.
 ///
-/// Of a Gaussian field all but [`grouping`](Self::grouping) are 0 up to chance, and that depends on the spectrum alone: set
-/// it beside a Gaussian field of the same spectrum.
+/// For a Gaussian field all but [`grouping`](Self::grouping) are 0 up to chance; `grouping` depends on the spectrum alone, so
+/// compare it with that of a Gaussian field of the same spectrum.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SeaShape {
     /// Skewness of the values \[1\].
@@ -29,8 +29,8 @@ pub(super) struct SeaShape {
 
 /// The shape of a field; `None` for less than 3 × 3 pixels, or a constant.
 ///
-/// - `field`: grey, or what is left of it after an expected image is subtracted
-/// - `wind_toward` where the wind blows to \[rad clockwise from azimuth\]
+/// - `field`: grey, or grey less an expected image
+/// - `wind_toward`: direction the wind blows to \[rad clockwise from azimuth\]
 pub(super) fn sea_shape(field: &Field, wind_toward: f64) -> Option<SeaShape> {
     if field.rows < 3 || field.columns < 3 {
         return None;
@@ -70,8 +70,9 @@ pub(super) fn sea_shape(field: &Field, wind_toward: f64) -> Option<SeaShape> {
     })
 }
 
-/// Variance of what is left of an image on the crests of its expected image, over that in its troughs \[1\]; `None` where
-/// the expected image is flat or nothing is left.
+/// Variance of an image less its expected image on the crests of the latter, over that in its troughs \[1\].
+///
+/// It is `None` where the expected image is flat or nothing is left in the troughs.
 ///
 /// A random sea that is merely added to a wake has 1. Crests and troughs are the highest and the lowest quarter of the
 /// expected image's pixels.
@@ -153,8 +154,8 @@ mod tests {
             .collect()
     }
 
-    /// Independent normal numbers: skewness has the standard error √(6/n), kurtosis √(24/n); a difference of two
-    /// neighbours of a pixel is used four times in a row of sums, which at most doubles that of the derivative.
+    /// Independent normal numbers: skewness has the standard error √(6/n), kurtosis √(24/n); derivatives share pixels with
+    /// their neighbours, which at most doubles the error of their skewness.
     #[test]
     fn white_noise_has_no_shape() {
         let noise = white(1);
@@ -165,7 +166,7 @@ mod tests {
         for skewness in shape.derivative_skewness {
             assert!(skewness.abs() < 10.0 * (6.0 / n).sqrt(), "{shape:?}");
         }
-        // The square of a normal number has the variance 2, which a bell of σ divides by 4πσ².
+        // The square of a normal number has the variance 2, which a Gaussian window of σ divides by 4πσ².
         let expected = (2.0 / (4.0 * PI * BELL * BELL)).sqrt();
         assert!((shape.grouping / expected - 1.0).abs() < 0.1, "{shape:?}");
     }
@@ -179,7 +180,7 @@ mod tests {
         let e = (s * s).exp();
         let skewness = (e + 2.0) * (e - 1.0).sqrt();
         let kurtosis = e.powi(4) + 2.0 * e.powi(3) + 3.0 * e * e - 6.0;
-        // The eighth moment of the lognormal leaves the kurtosis of 65,536 numbers 5 %.
+        // The eighth moment of the lognormal gives the kurtosis of 65,536 numbers an error of 5 %.
         assert!((shape.skewness / skewness - 1.0).abs() < 0.05, "{shape:?}");
         assert!((shape.kurtosis / kurtosis - 1.0).abs() < 0.2, "{shape:?}");
     }
@@ -218,7 +219,7 @@ mod tests {
         );
     }
 
-    /// Noise whose energy is 1 + m cos has the local energy's deviation m/√2.
+    /// With a noise energy of 1 + m cos the local energy has the deviation m/√2.
     #[test]
     fn groups_are_counted() {
         let noise = white(3);

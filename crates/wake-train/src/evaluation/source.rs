@@ -1,4 +1,4 @@
-//! Where images come from: anything that draws scenes.
+//! Sources of images.
 
 use std::fmt::Debug;
 
@@ -8,7 +8,7 @@ use wake_text::Wording;
 use crate::error::{Error, Result};
 use wake_ldm::sampler::{PromptMode, WakeSampler};
 
-/// Images that a source is asked for at once.
+/// Images requested from a source at once.
 pub(super) const BATCH: usize = 8;
 
 /// Inputs that describe a scene to a model.
@@ -23,7 +23,7 @@ pub enum Told {
     Numbers,
     /// Another wording of the sentence, alone.
     Paraphrase,
-    /// The scene itself, with all that no sentence says.
+    /// The scene itself, including what no sentence states.
     Scene,
 }
 
@@ -48,16 +48,16 @@ pub trait ImageSource: Debug {
     ///
     /// # Errors
     ///
-    /// If one cannot be drawn. Another number of images, or another size, is refused by the evaluation.
+    /// If an image cannot be drawn. The evaluation refuses images of a wrong number or size.
     fn draw(&self, scenes: &[Scene], told: Told) -> Result<Vec<Field>>;
 
-    /// Whether its images have speckle already, as those of a model that learnt speckled images.
+    /// Whether its images already have speckle, as those of a model trained on speckled images.
     fn has_speckle(&self) -> bool {
         false
     }
 }
 
-/// The wake model takes the inputs of the call, whatever [`PromptMode`] it has; for [`Told::Scene`] it uses its own.
+/// The wake model uses the given inputs whatever [`PromptMode`] it has; only for [`Told::Scene`] it uses its own.
 impl ImageSource for WakeSampler {
     fn draw(&self, scenes: &[Scene], told: Told) -> Result<Vec<Field>> {
         let (told, wording) = match told {
@@ -86,7 +86,7 @@ impl ImageSource for WakeSampler {
     }
 }
 
-/// Images of a source, one of each scene and of its size, which a source of a user's own might miss.
+/// Draws images of a source, and checks that there is one of each scene and of its size.
 pub(super) fn drawn(source: &dyn ImageSource, scenes: &[Scene], told: Told) -> Result<Vec<Field>> {
     let images = source.draw(scenes, told)?;
     let size = |image: &Field| [image.rows, image.columns, image.values.len()];
@@ -107,7 +107,7 @@ pub(super) fn drawn(source: &dyn ImageSource, scenes: &[Scene], told: Told) -> R
 /// A source of images, and its name in reports.
 pub type Named<'a> = (&'static str, &'a dyn ImageSource);
 
-/// The same scene with another random sea, that of the seed `number` further on.
+/// The same scene with another random sea, that of the seed plus `number`.
 #[must_use]
 pub fn other_sea(scene: &Scene, number: u64) -> Scene {
     Scene {
@@ -121,7 +121,7 @@ pub fn other_sea(scene: &Scene, number: u64) -> Scene {
 mod tests {
     use super::*;
 
-    /// A source of which each image is one pixel that tells how many were drawn with it.
+    /// Source whose images are one pixel, the number of images drawn together.
     #[derive(Debug)]
     struct Counted;
 
@@ -136,7 +136,7 @@ mod tests {
         }
     }
 
-    /// One pixel is not the image of a scene of more, and no image is not that of one.
+    /// A one-pixel image of a larger scene is refused, and so is a missing image.
     #[test]
     fn other_images_than_were_asked_for_are_refused() {
         #[derive(Debug)]

@@ -5,7 +5,7 @@ use serde::Serialize;
 /// Errors of one quantity over many scenes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AbsoluteErrors {
-    /// Scenes that count.
+    /// Number of scenes.
     pub scenes: usize,
     /// Share of them in which the value is measurable.
     pub measurable: f64,
@@ -16,7 +16,7 @@ pub struct AbsoluteErrors {
 }
 
 impl AbsoluteErrors {
-    /// From the absolute errors; `None` where not measurable.
+    /// Statistics of absolute errors, `None` where not measurable.
     #[must_use]
     pub fn of(errors: &[Option<f64>]) -> Self {
         let measured: Vec<f64> = errors.iter().flatten().copied().collect();
@@ -29,7 +29,7 @@ impl AbsoluteErrors {
     }
 }
 
-/// A quantile by linear interpolation; `None` of nothing.
+/// A quantile by linear interpolation; `None` without values.
 ///
 /// - `q`: 0, the smallest value, to 1, the largest
 #[must_use]
@@ -44,7 +44,7 @@ pub(super) fn quantile(values: &[f64], q: f64) -> Option<f64> {
     Some(below + (place - place.floor()) * (above - below))
 }
 
-/// The mean; `None` of nothing.
+/// The mean; `None` without values.
 #[must_use]
 pub(super) fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)

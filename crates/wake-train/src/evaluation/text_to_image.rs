@@ -12,20 +12,20 @@ use super::source::{ImageSource, Told};
 use super::view::View;
 use crate::error::Result;
 
-/// Draws scenes with a latent diffusion model from the paper's sentence alone, whatever else is known of them.
+/// Draws scenes with a latent diffusion model from the paper's sentence alone.
 #[derive(Debug)]
 pub struct TextToImage<'a> {
     /// The model; where it draws several channels, grey is their mean.
     pub pipeline: &'a Pipeline,
-    /// Scheduler, unless it is the pipeline's own.
+    /// Scheduler; `None`: the pipeline's own.
     pub scheduler: Option<SchedulerConfig>,
     /// Steps of the scheduler.
     pub steps: usize,
     /// Guidance scale; 1 or less: no guidance.
     pub guidance: f64,
-    /// The mapping from σ⁰ to grey of the images that it learnt.
+    /// Mapping from σ⁰ to grey of its training images.
     pub grey: GreyScale,
-    /// Whether these had speckle.
+    /// Whether its training images had speckle.
     pub speckle: bool,
 }
 
@@ -54,7 +54,7 @@ impl ImageSource for TextToImage<'_> {
     }
 }
 
-/// Simulated images that a pipeline's autoencoder encodes and decodes: the best that its model could draw.
+/// Simulated images encoded and decoded by a pipeline's autoencoder: the best that its model could draw.
 #[derive(Debug)]
 pub struct Reconstructed<'a> {
     /// The pipeline.

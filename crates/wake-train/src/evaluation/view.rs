@@ -1,4 +1,4 @@
-//! How images are looked at: their mapping to grey, and whether they have speckle.
+//! View of images: their mapping to grey, and whether they have speckle.
 
 use wake_physics::grey::GreyScale;
 use wake_physics::sar::speckle::speckle;
@@ -8,21 +8,21 @@ use super::reading::Reading;
 use super::source::{BATCH, ImageSource, Told, drawn};
 use crate::error::Result;
 
-/// The mapping to grey of all images that are compared, and whether they are compared with speckle.
+/// Mapping to grey of all compared images, and whether they are compared with speckle.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct View {
-    /// The mapping from σ⁰ to grey, that of the data set which a model learnt.
+    /// Mapping from σ⁰ to grey, that of the model's training data.
     pub grey: GreyScale,
     /// Whether images have speckle: that of the scene's radar, unless the source draws its own.
     pub speckle: bool,
 }
 
 impl View {
-    /// Images of a source, one of each scene.
+    /// Draws images of a source, one of each scene.
     ///
     /// # Errors
     ///
-    /// As [`ImageSource::draw`], and [`wake_nn::Error::InvalidOption`] for other images than were asked for.
+    /// As [`ImageSource::draw`], and [`wake_nn::Error::InvalidOption`] for images of a wrong number or size.
     pub fn draw(
         &self,
         source: &dyn ImageSource,
@@ -38,7 +38,7 @@ impl View {
         Ok(images)
     }
 
-    /// All images of a source, some at once.
+    /// Draws all images of a source, batch by batch.
     ///
     /// - `step`: called with the number of images after each batch
     pub(super) fn draw_all(
@@ -66,7 +66,7 @@ impl View {
         }
     }
 
-    /// The values that an image shows.
+    /// Measures the values in an image.
     pub(super) fn read(&self, image: &Field, scene: &Scene) -> Result<Reading> {
         match self.speckle {
             true => Reading::of_speckled(image, scene),
@@ -113,7 +113,7 @@ mod tests {
         assert_eq!((images.len(), steps), (BATCH + 3, vec![BATCH as u64, 3]));
     }
 
-    /// Speckle comes once: to sources without it, if it is asked for.
+    /// Speckle is applied once: to sources without it, if it is requested.
     #[test]
     fn speckle_comes_once() {
         let keys = ["grid.rows = 32", "grid.columns = 32"];

@@ -1,4 +1,4 @@
-//! Wake correlation: what is the same in every image of a scene, against what the simulator says it is.
+//! Wake correlation: mean images of a scene over many seas, the model's against the simulator's.
 
 use serde::Serialize;
 use wake_physics::measure::kelvin_wedge;
@@ -30,7 +30,7 @@ pub struct WakeCorrelation {
     pub ratio_median: Option<f64>,
 }
 
-/// Measures the correlation of grey over scenes, each of which is drawn with eight seas, in the wedge of its first ship.
+/// Measures the wake correlation of grey, inside the Kelvin wedge of each scene's first ship and over eight seas per scene.
 ///
 /// - `model`: conditioned on sentence and numbers
 /// - `step`: called after each scene
@@ -104,7 +104,7 @@ fn mean_of(images: &[Field]) -> Field {
     mean
 }
 
-/// A constant image correlates with nothing.
+/// Correlation inside a mask; 0 for a constant image.
 fn correlated(one: &Field, other: &Field, inside: &[bool]) -> f64 {
     let planes = [one, other].map(|f| Plane::new(&f.values, f.columns));
     correlation(&planes[0], &planes[1], inside).unwrap_or(0.0)
@@ -115,7 +115,7 @@ fn correlated(one: &Field, other: &Field, inside: &[bool]) -> f64 {
 mod tests {
     use super::*;
 
-    /// The simulator in the place of the model draws the very images that it is compared with; a constant none.
+    /// The simulator as the model draws the very images that it is compared with; a constant correlates with nothing.
     #[test]
     fn what_is_the_same_in_all_seas_correlates() {
         let keys = ["grid.rows = 64", "grid.columns = 64"];

@@ -1,4 +1,4 @@
-//! Pairs of a data set, as a latent diffusion model takes them.
+//! Pairs of a data set as inputs of a latent diffusion model.
 
 use crate::error::Result;
 use crate::streams;
@@ -7,36 +7,36 @@ use wake_ldm::pipeline::token_ids;
 use wake_nn::noise::NoiseSource;
 use wake_text::Tokenizer;
 
-/// Part of the images whose prompt is left out, for guidance.
+/// Share of the images whose prompt is left out, for guidance.
 const WITHOUT_PROMPT: f64 = 0.1;
 
-/// Whether the prompt of the image at a position of a run is told to the model.
+/// Whether the model is conditioned on the prompt of the image at a position of a run.
 ///
-/// - `stream`: of the random numbers that decide
+/// - `stream`: stream of the random numbers
 pub(crate) fn is_told(random: NoiseSource, stream: u32, position: u64) -> bool {
     random.uniform(stream, position) >= WITHOUT_PROMPT
 }
 
-/// An image beside its prompt in tokens.
+/// Image with its tokenized prompt.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Prompted {
     /// The image, 0 to 1.
     pub image: Grey,
-    /// Ids of the prompt, marks and padding included.
+    /// Token ids of the prompt, including marks and padding.
     pub ids: Vec<i32>,
 }
 
-/// Where prompted images come from: a function of the position alone.
+/// Source of images with prompts, a function of the position alone.
 pub(crate) trait PromptedSource: Sync {
-    /// The one at a position of a run; all have one size and one number of tokens.
+    /// Image and prompt at a position of a run; all have one size and one number of tokens.
     ///
     /// # Errors
     ///
-    /// Those of what it reads.
+    /// Errors of reading the data.
     fn at(&self, position: u64) -> Result<Prompted>;
 }
 
-/// Pairs of a folder's `trainset.txt`, drawn with a seed, each as likely as every other, a tenth of them without their prompts.
+/// Pairs of a folder's `trainset.txt`, drawn at random with equal probability, a tenth of them without their prompts.
 ///
 /// # References
 ///
@@ -50,7 +50,7 @@ pub(crate) struct PromptedPairs<'a> {
 }
 
 impl<'a> PromptedPairs<'a> {
-    /// Those of a folder; a tokenizer of `None` is CLIP's own.
+    /// Pairs of a folder; a tokenizer of `None` is CLIP's own.
     #[must_use]
     pub(crate) fn new(data: &'a Folder, tokenizer: Option<&'a Tokenizer>, seed: u64) -> Self {
         Self {

@@ -1,11 +1,12 @@
-//! Steps at the size of Stable Diffusion v1.4, with random weights: seconds and memory.
+//! Time and memory of training steps at the size of Stable Diffusion v1.4, with random weights.
 //!
 //! ```text
 //! SIDE=512 RANK=8 cargo test --release -p wake-train --lib full_size -- --ignored --nocapture
 //! ```
 //!
-//! Environment: `SIDE` of the images \[pixels\], `RANK` (without it the whole U-Net learns), `BATCH`, `STEPS`, `DEVICE` (flex), and `CHECKPOINTING`
-//! and `BF16`, which are on if they are set. `benches/torch_reference.py fine-tune` measures the same with torch.
+//! Environment: `SIDE` of the images \[pixels\], `RANK` (without it the whole U-Net is trained), `BATCH`, `STEPS`, `DEVICE`
+//! (flex), and `CHECKPOINTING` and `BF16`, which are on if they are set. `benches/torch_reference.py fine-tune` measures the
+//! same with torch.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 #![allow(clippy::print_stdout, reason = "figures are what it is for")]
@@ -63,7 +64,7 @@ fn peak() -> f64 {
     kib.unwrap_or(f64::NAN) * 1024e-9
 }
 
-/// A module whose random weights are drawn now; else every copy would draw them in its first step.
+/// Initializes the random weights of a module now; otherwise every copy would do so in its first step.
 fn drawn<M: Module>(module: M) -> M {
     values(&module);
     module

@@ -24,12 +24,12 @@ pub(crate) use batches::is_told;
 pub(crate) use batches::{PromptedPairs, PromptedSource};
 pub use training::FineTuning;
 
-/// The parts of the model that do not learn, outside autodiff.
+/// Frozen parts of the model, outside autodiff.
 #[derive(Debug, Clone)]
 pub(crate) struct Frozen {
-    /// Words to tokens.
+    /// Encodes prompts.
     pub text: ClipText,
-    /// Images to latents.
+    /// Encodes images to latents.
     pub autoencoder: AutoencoderKl,
 }
 
@@ -42,13 +42,13 @@ impl Frozen {
     }
 }
 
-/// Fitting a latent diffusion model to other images: a task for a [`UNet`], and for low-rank changes of one.
+/// Fine-tuning task for a [`UNet`], or for low-rank changes of one.
 ///
 /// ```text
 /// x = √ᾱₜ x₀ + √(1 − ᾱₜ) n,    loss = w(t) |model(x, t, words) − target|²
 /// ```
 ///
-/// The target is n, or √ᾱₜ n − √(1 − ᾱₜ) x₀, or x₀; images are encoded and prompts read without gradients.
+/// The target is n, or √ᾱₜ n − √(1 − ᾱₜ) x₀, or x₀; images and prompts are encoded without gradients.
 ///
 /// # References
 ///
@@ -64,25 +64,25 @@ pub(crate) struct FineTuneTask<S> {
     places: Vec<OnDevice>,
 }
 
-/// What does not learn, on one device.
+/// Frozen parts on one device.
 #[derive(Debug)]
 struct OnDevice {
-    /// In autodiff.
+    /// Autodiff device.
     device: Device,
-    // Weights are shared by cheap copies, which one thread at a time makes.
+    // Copies share the weights and are cheap; one thread at a time makes them.
     frozen: Mutex<(Frozen, Option<UNet>)>,
 }
 
 impl<S: PromptedSource> FineTuneTask<S> {
-    /// Fits to images of a source.
+    /// Task on the images of a source.
     ///
-    /// - `schedule`: how much noise each step has
+    /// - `schedule`: noise level of each step
     /// - `prediction`: what the U-Net predicts
-    /// - `devices`: autodiff devices that a run learns on
+    /// - `devices`: autodiff devices of the run
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::Unsupported`] for the prediction of a flow, which mixes noise and image along a line and not with √ᾱ.
+    /// [`wake_nn::Error::Unsupported`] for flow prediction, which mixes noise and image linearly and not with √ᾱ.
     pub(crate) fn new(
         source: S,
         frozen: &Frozen,
@@ -111,14 +111,14 @@ impl<S: PromptedSource> FineTuneTask<S> {
         })
     }
 
-    /// Weighs steps by their signal-to-noise ratio, no more than γ; without it every step counts the same.
+    /// Sets γ, at which the signal-to-noise ratio in the weights of steps is clipped; with `None` all steps have equal weights.
     #[must_use]
     pub(crate) fn with_snr_gamma(mut self, gamma: Option<f64>) -> Self {
         self.snr_gamma = gamma;
         self
     }
 
-    /// Learns low-rank changes of this U-Net, which stays as it is.
+    /// Sets the U-Net whose low-rank changes are trained; it stays as it is.
     #[must_use]
     pub(crate) fn with_base(self, unet: &UNet) -> Self {
         for place in &self.places {
@@ -128,7 +128,7 @@ impl<S: PromptedSource> FineTuneTask<S> {
         self
     }
 
-    /// The models that do not learn, where a loss is computed.
+    /// Frozen models on the device of a loss.
     fn frozen_on(&self, device: &Device) -> (Frozen, Option<UNet>) {
         let mut places = self.places.iter();
         let there = places.find(|place| place.device == *device);
@@ -136,7 +136,7 @@ impl<S: PromptedSource> FineTuneTask<S> {
         lock(&there.frozen).clone()
     }
 
-    /// What a batch asks the model.
+    /// Inputs, target and weights of a batch.
     fn question(&self, frozen: &Frozen, batch: &PromptedBatch, device: &Device) -> Question {
         let inner = device.clone().inner();
         let (positions, count) = (batch.positions.clone(), batch.steps.len());
@@ -202,7 +202,7 @@ pub(crate) struct PromptedBatch {
     images: TensorData,
     /// `[batch, tokens]`
     ids: TensorData,
-    /// The step of the schedule of each.
+    /// Step of the noise schedule of each image.
     steps: Vec<usize>,
     positions: Range<u64>,
 }
@@ -230,7 +230,7 @@ impl<S: PromptedSource> Task<LowRank> for FineTuneTask<S> {
 
     /// # Panics
     ///
-    /// Without [`with_base`](FineTuneTask::with_base).
+    /// When [`with_base`](FineTuneTask::with_base) was not called.
     fn loss(
         &self,
         changes: &LowRank,
@@ -248,7 +248,7 @@ fn lock<T>(value: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     value.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What a batch asks the model, and the answer.
+/// Inputs of the U-Net for a batch, its target, and weights of the squared error.
 struct Question {
     input: UNetInput,
     target: Tensor<4>,
@@ -262,17 +262,17 @@ impl Question {
     }
 }
 
-/// Noisy latents, their steps, and what the model should say of them.
+/// Noisy latents, their steps, and the target of the model.
 pub(super) struct Noised {
     /// `[batch, channels, rows, columns]`
     pub(super) sample: Tensor<4>,
     /// `[batch]`
     pub(super) timesteps: Tensor<1>,
-    /// As `sample`.
+    /// Same shape as `sample`.
     pub(super) target: Tensor<4>,
 }
 
-/// Mixes latents with noise, each as much as its step has.
+/// Mixes latents with noise at the levels of their steps.
 pub(super) fn noised(
     schedule: &NoiseSchedule,
     prediction: Prediction,

@@ -1,4 +1,4 @@
-//! A toy Stable Diffusion learns one image by heart.
+//! A toy latent diffusion model is fine-tuned on four images.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
@@ -50,7 +50,7 @@ fn schedule() -> NoiseSchedule {
     NoiseSchedule::new(&curve, 1000, TerminalSnr::Zero).unwrap()
 }
 
-/// Four waves, again and again, each with words of its own.
+/// Four waves in turn, each with its own prompt.
 #[derive(Debug)]
 struct Waves;
 
@@ -132,7 +132,7 @@ fn noise_and_velocity_are_learnt() {
     for prediction in [Prediction::Epsilon, Prediction::Velocity] {
         let (unet, task) = (unet(&device), task(prediction, &frozen(&device)));
         let of = |peak: f64| losses(&mut whole(&unet, options(peak, 1), 1), &task, 100);
-        // Both see the same draws, one of them with steps too small to learn: step by step, only what is learnt differs.
+        // Both have the same draws, and one a learning rate too small to learn: only what is learnt differs, step by step.
         let (learning, idle) = (of(5e-3), of(1e-12));
         let gains: Vec<f64> = idle
             .iter()
@@ -170,7 +170,7 @@ fn low_rank_changes_leave_the_model_as_it_is() {
     assert_eq!(different, changed.layers().len());
 }
 
-/// Losses and lengths of the gradient of three steps.
+/// Losses and gradient norms of three steps.
 fn curve<M: Module>(mut run: Run<M>, task: &impl Task<M>) -> Vec<f64> {
     let step = |_| {
         let (report, _) = run.step(task).unwrap();
@@ -187,7 +187,7 @@ fn parts_of_a_batch_make_the_step_of_the_whole() {
     let task = task(Prediction::Epsilon, &frozen).with_base(&base);
     let near = |one: &[f64], other: &[f64]| {
         for (a, b) in one.iter().zip(other) {
-            // Sums of f32 over another order of some thousand terms, with cancellation.
+            // Sums of some thousand f32 terms in another order, with cancellation.
             assert!((a - b).abs() < 1e-4 * a, "{one:?} {other:?}");
         }
     };
@@ -200,7 +200,7 @@ fn parts_of_a_batch_make_the_step_of_the_whole() {
     near(&one, &other);
 }
 
-/// What one part is computed from is that part alone: memory falls with the number of parts.
+/// A part is computed from its own images alone, so memory falls with the number of parts.
 #[test]
 fn a_part_holds_its_own_images_alone() {
     let frozen = frozen(&Device::flex());
@@ -218,7 +218,7 @@ fn a_part_holds_its_own_images_alone() {
     assert_eq!(part.images.iter::<f32>().collect::<Vec<_>>(), pixels);
 }
 
-/// Of a set whose images are all for validation but one, that one is drawn.
+/// If all images but one are for validation, only that one is drawn.
 #[test]
 fn pairs_for_validation_are_not_learnt_from() {
     let folder = tempfile::tempdir().unwrap();
@@ -272,7 +272,7 @@ fn weights_at_each_signal_to_noise_ratio_are_the_closed_form() {
     let snr = [0.0, 0.5, 5.0, 20.0, 1e6];
     let noise = min_snr_weights(&snr, 5.0, Prediction::Epsilon);
     let velocity = min_snr_weights(&snr, 5.0, Prediction::Velocity);
-    // The sample's error is the noise's times the ratio: x₀ = (x − √(1 − ᾱ) n)/√ᾱ.
+    // The sample's weight is the noise's times the ratio: x₀ = (x − √(1 − ᾱ) n)/√ᾱ.
     let sample = min_snr_weights(&snr, 5.0, Prediction::Sample);
     for ((sample, noise), snr) in sample.iter().zip(&noise).zip(snr) {
         assert!(
@@ -292,7 +292,7 @@ fn weights_at_each_signal_to_noise_ratio_are_the_closed_form() {
     }
 }
 
-/// √ᾱ mixes noise in, which is not the straight line that a flow is the slope of.
+/// √ᾱ does not mix noise and image linearly, as flow prediction needs.
 #[test]
 fn the_prediction_of_a_flow_is_refused() {
     let (frozen, how) = (frozen(&Device::flex()), (schedule(), Prediction::Flow));

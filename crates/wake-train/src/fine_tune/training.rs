@@ -1,4 +1,4 @@
-//! Fine-tuning in the folder of one run.
+//! Fine-tuning in a run folder.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -28,40 +28,42 @@ const DEFAULTS: StageDefaults = StageDefaults {
     batch: 16,
     rate: 1e-5,
 };
-/// Steps over which the rate rises to its largest.
+/// Warm-up steps of the learning rate.
 const WARMUP: usize = 20;
 /// Name of the stage, its checkpoints and its log.
 const STAGE: &str = "fine_tune";
-/// What is written: the model, and the changes alone where they are what learns.
+/// Files that are written: the model, and the low-rank changes if these are trained.
 const INDEX: &str = "model_index.json";
 const UNET: &str = "unet/diffusion_pytorch_model.safetensors";
 const CHANGES: &str = "pytorch_lora_weights.safetensors";
 
-/// Fine-tuning of a model in diffusers layout on the pairs of a folder: its whole U-Net and nothing else, or low-rank
-/// changes of that.
+/// Fine-tuning of a model in diffusers layout on the pairs of a folder: its whole U-Net, or low-rank changes of it.
 #[derive(Debug, Clone)]
 pub struct FineTuning<'a> {
-    /// Folder of the model that is begun with.
+    /// Folder of the initial model.
     pub weights: &'a Path,
     /// Training data: the pairs of its `trainset.txt`.
     pub data: &'a Folder,
-    /// Rank of the changes of the attentions; `None`: the whole U-Net learns.
+    /// Rank of the changes of the attention layers; `None`: the whole U-Net is trained.
     pub rank: Option<usize>,
-    /// γ of the weights by signal-to-noise ratio, Hang et al. (2023), "Efficient Diffusion Training via Min-SNR Weighting Strategy".
+    /// γ of the weights by signal-to-noise ratio, Hang et al. (2023), "Efficient Diffusion Training via Min-SNR Weighting
+    /// Strategy".
     pub snr_gamma: Option<f64>,
     /// Options of the run.
     pub options: StageOptions,
 }
 
 impl FineTuning<'_> {
-    /// Makes all steps. Writes the model, `pytorch_lora_weights.safetensors` where changes are what learns, a log, and `config.json`,
-    /// `run.json` and `checkpoints/`; a run that was killed goes on from its last checkpoint.
+    /// Runs the training; a killed run can be resumed from its last checkpoint.
+    ///
+    /// Writes the model, `pytorch_lora_weights.safetensors` for low-rank changes, a log, `config.json`, `run.json` and
+    /// `checkpoints/`.
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::InvalidOption`] for images of another size than the autoencoder takes and a set without pairs to learn
-    /// from; [`wake_nn::Error::Unsupported`] for a scheduler without a noise schedule, or the prediction of a flow; else as
-    /// [`Pipeline::load`], [`RunOptions::validate`]; [`wake_nn::Error::InvalidOption`] for a folder of another run.
+    /// [`wake_nn::Error::InvalidOption`] for images of a size that the autoencoder does not take, a set without training pairs
+    /// and a folder of another run; [`wake_nn::Error::Unsupported`] for a scheduler without a noise schedule, or flow
+    /// prediction; else as [`Pipeline::load`], [`RunOptions::validate`].
     pub fn train(&self, out: &Path, progress: &dyn Fn(Progress)) -> Result<()> {
         let constants = self.constants()?;
         let device = self.options.device();
@@ -122,14 +124,14 @@ impl FineTuning<'_> {
         }
     }
 
-    /// Bytes on disk of a checkpoint, and of the model that is written beside them.
+    /// Bytes on disk of a checkpoint, and of the model written beside it.
     ///
     /// A checkpoint of a whole U-Net holds its weights, their averages and the two averages of the optimizer in 32 bits; low-rank
     /// changes are counted as nothing.
     ///
     /// # Errors
     ///
-    /// Those of weight files that cannot be read.
+    /// When weight files cannot be read.
     pub fn disk(&self) -> Result<[u64; 2]> {
         let numbers = |part: &str| -> Result<u64> {
             let files = WeightFiles::open(&self.weights.join(part))?;
@@ -142,7 +144,7 @@ impl FineTuning<'_> {
         Ok([if self.rank.is_none() { 16 * unet } else { 0 }, 4 * all])
     }
 
-    /// The run, checked before anything is read but the files that it learns from.
+    /// Constants of the run, validated before any file is read.
     fn constants(&self) -> Result<RunOptions> {
         let mut constants = self.options.run(&DEFAULTS, Value::Null);
         constants.trainer.rate.warmup = WARMUP;
@@ -151,7 +153,7 @@ impl FineTuning<'_> {
         Ok(constants)
     }
 
-    /// What a run learns from: the files of the model it begins with, and the set.
+    /// Identity of the training data: files of the initial model, and the data set.
     fn identity(&self) -> Result<Value> {
         let mut files = BTreeMap::new();
         for part in ["unet", "vae", "text_encoder", "scheduler"] {
@@ -162,7 +164,7 @@ impl FineTuning<'_> {
             for path in paths {
                 let name = path.file_name().unwrap_or_default();
                 let name = name.to_string_lossy();
-                // Downloads hold the same weights in other formats, too.
+                // Downloads also hold the same weights in other formats.
                 let read = name.ends_with(".json") || name.ends_with(".safetensors");
                 if path.is_file() && read && !name.starts_with('.') {
                     files.insert(format!("{part}/{name}"), fingerprint(&path)?);
@@ -194,7 +196,7 @@ fn what_is_learnt(parts: &PipelineParts) -> Result<(NoiseSchedule, Prediction)> 
     Ok((schedule, prediction))
 }
 
-/// Refuses images that the autoencoder cannot halve as often as it does.
+/// Refuses an empty set, and images whose sides are not multiples of the autoencoder's downsampling.
 fn check_size(data: &Folder, count: usize, down: usize) -> Result<()> {
     let grid = &data.manifest().recipe.scene.grid;
     if grid.rows.is_multiple_of(down) && grid.columns.is_multiple_of(down) && count > 0 {

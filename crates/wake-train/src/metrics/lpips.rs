@@ -26,9 +26,9 @@ pub enum LpipsNetwork {
 enum Step {
     /// Convolution and `ReLU`: number in torchvision's `features`, channels in and out, kernel, stride, padding.
     Conv(usize, [usize; 2], [usize; 3]),
-    /// Squeeze and two expansions: number, channels in, squeezed, and of each expansion.
+    /// Fire module: number, channels in, squeezed, and of each of the two expansions.
     Fire(usize, [usize; 3]),
-    /// Maximum over 3 × 3, stride 2; that of `SqueezeNet` keeps the rest at the border.
+    /// Maximum over 3 × 3, stride 2; `true` rounds the output size up, as `SqueezeNet` does.
     Pool(bool),
     /// Features are compared here.
     Tap(usize),
@@ -89,7 +89,7 @@ impl LpipsNetwork {
         }
     }
 
-    /// Names and shapes of the weights of the network, torchvision's.
+    /// Names and shapes of the network's weights, as in torchvision.
     fn backbone(self) -> Vec<(String, Vec<usize>)> {
         let mut shapes = Vec::new();
         let mut conv = |name: String, [input, output]: [usize; 2], kernel: usize| {
@@ -137,7 +137,7 @@ const SCALE: [f32; 3] = [0.458, 0.448, 0.450];
 
 /// Perceptual distance of two images.
 ///
-/// No weights lie in this crate: they are read from files of the user, in the layout of torchvision (`features.…`) and
+/// This crate holds no weights: they are read from the user's files, in the layout of torchvision (`features.…`) and
 /// of the package `lpips` (`lin0.model.1.weight` …).
 ///
 /// # References
@@ -167,8 +167,8 @@ impl Lpips {
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::Io`], [`wake_nn::Error::InvalidSafetensors`], or [`wake_nn::Error::WeightsMismatch`] for tensors that are missing or of
-    /// another shape, or no numbers; other tensors in the files are left alone.
+    /// [`wake_nn::Error::Io`], [`wake_nn::Error::InvalidSafetensors`], or [`wake_nn::Error::WeightsMismatch`] for tensors that
+    /// are missing, of another shape or not floating-point; other tensors in the files are ignored.
     pub fn load(
         network: LpipsNetwork,
         backbone: &Path,
@@ -293,7 +293,7 @@ fn unit(features: Tensor<4>) -> Tensor<4> {
     features / (length + 1e-10)
 }
 
-/// Reads tensors by name, in the order they are wanted in.
+/// Reads tensors by name, in the requested order.
 fn read(
     path: &Path,
     wanted: impl Fn(&BTreeMap<String, Stored<'_>>) -> Vec<(String, Vec<usize>)>,

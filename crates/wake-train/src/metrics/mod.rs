@@ -1,7 +1,7 @@
-//! How close two images are: PSNR, SSIM, LPIPS, and the correlation of what is deterministic in them.
+//! Similarity of two images: PSNR, SSIM, LPIPS, and correlation.
 //!
-//! Pixel metrics between two random seas say little by themselves: each figure belongs beside those of a second
-//! simulated image of the same scene, of a constant image and of a blurred one.
+//! Pixel metrics between two random seas say little by themselves: compare each with those of a second simulated image of the
+//! same scene, of a constant image and of a blurred one.
 
 mod lpips;
 mod plane;

@@ -1,4 +1,4 @@
-//! Images of one channel, and what is summed pixel by pixel.
+//! Single-channel images, and metrics that are summed pixel by pixel.
 
 /// One channel of an image, row after row.
 #[derive(Debug, Clone, Copy, PartialEq)]

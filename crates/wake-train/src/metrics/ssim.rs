@@ -21,7 +21,7 @@ impl SsimWindow {
         }
     }
 
-    /// Factor from the variance of the population to the one that is used.
+    /// Factor from the population variance to the variance used.
     fn variance_factor(self) -> f64 {
         match self {
             Self::Gaussian => 1.0,

@@ -21,7 +21,7 @@ fn finite() -> impl Strategy<Value = f64> {
     numbers.prop_filter("finite", |number| number.is_finite())
 }
 
-/// Several of them, and one of 32 bits, as JSON.
+/// Several finite numbers, and one of 32 bits, as JSON.
 fn numbers() -> impl Strategy<Value = Value> {
     let short = finite().prop_map(|number| number as f32);
     let short = short.prop_filter("finite", |number| number.is_finite());
@@ -50,7 +50,7 @@ proptest! {
         prop_assert_eq!(read, bits);
     }
 
-    /// What a run was begun with is found again, to the last digit.
+    /// Model and data of a run are read back to the last digit.
     #[test]
     fn runs(model in numbers(), data in numbers()) {
         let folder = tempfile::tempdir().unwrap();
@@ -97,7 +97,7 @@ proptest! {
     }
 }
 
-/// The side of a pixel stands as text in the header of a learnt sea.
+/// The pixel spacing is stored as text in the header of a learnt sea.
 #[test]
 fn the_pixels_of_a_learnt_sea() {
     use wake_ldm::sea_texture::{SeaFlow, SeaStyle, SeaTexture};

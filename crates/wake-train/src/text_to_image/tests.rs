@@ -29,7 +29,7 @@ fn options(batch: usize, peak: f64, steps: usize) -> RunOptions {
     }
 }
 
-/// Waves along both axes, longer from image to image.
+/// Waves along both axes, longer in each further image.
 fn images(count: usize, size: usize) -> PromptedImages {
     let grey = |image: usize, row: usize, column: usize| {
         let [r, c] = [row, column].map(|x| x as f32 / (1.5 + image as f32));
@@ -50,7 +50,7 @@ fn autoencoder(device: &Device) -> AutoencoderKl {
         .init(device)
 }
 
-/// r² + 3c² has 2 + 6 everywhere, and a plane nothing; small integers are exact in 32 bits.
+/// The Laplacian of r² + 3c² is 2 + 6 everywhere, that of a plane 0; small integers are exact in 32 bits.
 #[test]
 fn the_laplacian_of_a_parabola_is_constant() {
     let value = |n: usize| ((n / 7).pow(2) + 3 * (n % 7).pow(2) + 5 * (n / 7)) as f32;
@@ -87,7 +87,7 @@ fn images_are_coded_and_decoded() {
     }
     let places: Vec<(usize, [usize; 2])> = (0..4).map(|image| (image, [0, 0])).collect();
     let model = run.averaged();
-    // All three terms count, with their weights; sums of a few numbers in 32 bits.
+    // All three terms count with their weights; the tolerance is that of sums of a few 32-bit numbers.
     let (loss, terms) = task.loss(&model, &device, &(0..4));
     let [error, curvature, divergence] = [0, 1, 2].map(|n| terms[n].1);
     let sum = error + curvature + 1e-5 * divergence;
@@ -97,17 +97,17 @@ fn images_are_coded_and_decoded() {
     let means = model.encode(pixels.clone()).mode();
     let decoded = model.decode(means.clone());
     let squares = |x: Tensor<4>| f64::from(x.square().mean().into_scalar::<f32>());
-    // The dumbest thing that could reach it: the mean grey.
+    // Baseline: the mean grey.
     let constant = squares(pixels.clone() - pixels.clone().mean().reshape([1, 1, 1, 1]));
     let error = squares(decoded - pixels);
     assert!(error < 0.1 * constant, "{error} of {constant}");
 
-    // Latents have mean 0 and variance 1, and are the means again once shift and scale are undone.
+    // Latents have mean 0 and variance 1; undoing shift and scale gives the posterior means.
     let (set, model) = images.encode(model, &device, |_| {});
     assert_eq!(set.shape(), [4, 4, 4]);
     let latents = batch(&set.latents, set.shape, &[0, 1, 2, 3], &device);
     let mean = f64::from(latents.clone().mean().into_scalar::<f32>());
-    // 16 bits keep eleven of a number: 2⁻¹¹ of each, and the root of 256 numbers less of their mean.
+    // Half precision keeps eleven bits: an error of 2⁻¹¹ of each number, and √256 times less of the mean of 256.
     let rounding = (0.5f64).powi(11);
     assert!(mean.abs() < rounding, "{mean}");
     assert!((squares(latents.clone()) - 1.0).abs() < 2.0 * rounding);
@@ -131,8 +131,8 @@ fn images_of_another_size_are_refused() {
     assert_eq!(empty.prompts[0].len(), 77);
 }
 
-/// Two latents that differ in sign, and steps with so little of them, ᾱ = 0.03 and 0.0009, that their mean of 0.17 at most can hardly be
-/// told from the noise's deviation of 0.09: only the prompt tells which. Of the wrong one the loss is larger by up to 4ᾱ.
+/// Two latents differ only in sign. With ᾱ = 0.03 and 0.0009 their mean is at most 0.17, hardly distinguishable from the noise's
+/// deviation of 0.09, so only the prompt identifies them. With the wrong prompt the loss is larger by up to 4ᾱ.
 #[test]
 fn the_prompt_says_which_image() {
     let device = Device::flex();
@@ -176,7 +176,7 @@ fn the_prompt_says_which_image() {
     for _ in 0..steps {
         assert!(run.step(&task(&right)).unwrap().0.applied);
     }
-    // The same noise, steps and order, batch by batch, with the prompts of both as learnt and exchanged.
+    // The same noise, steps and order in each batch, with the prompts as learnt and swapped.
     let model = run.averaged();
     let loss = |set, batch: u64| {
         let positions = 10_000 + 8 * batch..10_008 + 8 * batch;

@@ -1,4 +1,4 @@
-//! The last part: the flow that draws what mean and spread leave open.
+//! The last part: the flow, which draws the residuals from mean and spread.
 
 use burn::tensor::Device;
 use serde_json::json;
@@ -15,7 +15,7 @@ use wake_ldm::network::{Flow, Part, WakeModel};
 use wake_ldm::sampler::WakeSampler;
 
 impl WakeTraining<'_> {
-    /// Trains the flow, after all parts that are not trained yet.
+    /// Trains the flow, after all earlier parts that are not trained yet.
     pub(super) fn train_flow(&mut self, options: &StageOptions) -> Result<()> {
         if let Some(earlier) = self.earlier(Part::Parser)? {
             self.train_parser(&earlier)?;

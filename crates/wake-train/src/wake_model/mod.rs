@@ -25,12 +25,12 @@ use wake_ldm::network::{Part, PatchTransform, WakeModelConfig};
 use wake_nn::weights::{Layout, Precision, load, save_as};
 use whole_files::fingerprint;
 
-/// Images of the pairs beside those of the model.
+/// Images of the pairs above those of the model.
 const SHEET: &str = "sheet.png";
 /// Images in a row of a sheet.
 const ACROSS: u64 = 8;
 
-/// What training a part takes where nothing else is asked for; the patches take no steps.
+/// Default options of a part; the patches need no steps.
 fn defaults(part: Part) -> StageDefaults {
     let (steps, batch, rate) = match part {
         Part::Patches => (1, 1, 1e-3),
@@ -41,7 +41,7 @@ fn defaults(part: Part) -> StageDefaults {
     StageDefaults { steps, batch, rate }
 }
 
-/// Files that are there when a part is trained.
+/// Result files of a part.
 fn results(part: Part) -> &'static [&'static str] {
     match part {
         Part::Patches => const { &[Part::Patches.file()] },
@@ -53,8 +53,8 @@ fn results(part: Part) -> &'static [&'static str] {
 
 /// The training of one [`WakeModel`](wake_ldm::network::WakeModel) in a folder.
 ///
-/// A stage runs the earlier ones first, or to their end, where their weights are not in the folder yet. They leave there
-/// what [`WakeSampler::from_folder`](wake_ldm::WakeSampler::from_folder) reads (weights averaged, 16 bits),
+/// A stage first runs earlier stages that are missing or unfinished. Afterwards the folder holds what
+/// [`WakeSampler::from_folder`](wake_ldm::WakeSampler::from_folder) reads (averaged weights, 16 bits),
 /// `explained_variance.json`, a log `STAGE.jsonl` for each stage, `sheet.png`, `config.json`, `run.json` and `checkpoints/`.
 ///
 /// ```no_run
@@ -75,7 +75,7 @@ pub struct WakeTraining<'a> {
     part: Part,
     options: StageOptions,
     progress: &'a (dyn Fn(Progress) + Sync),
-    /// Of all pairs, once they were asked for.
+    /// Latents of all pairs, once computed.
     latents: Option<Arc<LatentSet>>,
 }
 
@@ -91,14 +91,15 @@ impl std::fmt::Debug for WakeTraining<'_> {
 }
 
 impl<'a> WakeTraining<'a> {
-    /// Takes the folder for one stage; whatever is refused is refused before anything is written.
+    /// Opens the folder for one stage; all checks are made before anything is written.
     ///
-    /// - `pairs`: what is learnt from, all of them scenes and images that the model can have; the parser alone needs none
-    /// - `progress`: called with what is done; residuals are computed by several threads
+    /// - `pairs`: training pairs, all with scenes and images that the model can have; only the parser needs none
+    /// - `progress`: called with progress messages, from several threads while residuals are computed
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::InvalidOption`] for a folder of another run; else as [`RunOptions::validate`](super::RunOptions::validate) and [`StageOptions::learning_devices`].
+    /// [`wake_nn::Error::InvalidOption`] for a folder of another run; else as
+    /// [`RunOptions::validate`](super::RunOptions::validate) and [`StageOptions::learning_devices`].
     pub fn open(
         out: PathBuf,
         (part, options): (Part, StageOptions),
@@ -125,17 +126,23 @@ impl<'a> WakeTraining<'a> {
         })
     }
 
-    /// Bytes that so many pairs need in memory while the prior or the flow learns.
-    pub fn memory(config: &WakeModelConfig, pairs: u64) -> u64 {
-        LatentSet::bytes(config, pairs)
+    /// Memory that a part needs for its latents of `pairs` pairs \[bytes\].
+    pub fn memory(config: &WakeModelConfig, pairs: u64, part: Part) -> u64 {
+        let copies = match part {
+            Part::Patches | Part::Parser => 0,
+            Part::Prior => 1,
+            // Latents, and their residuals in chunks and as a whole.
+            Part::Flow => 3,
+        };
+        copies * LatentSet::bytes(config, pairs)
     }
 
-    /// Trains the part, after those before it that are not trained yet.
+    /// Trains the part, after earlier parts that are not trained yet.
     ///
     /// # Errors
     ///
-    /// Those of the pairs and of files; [`Error::Diverged`]; [`wake_nn::Error::InvalidOption`] without pairs for any part but the parser,
-    /// and when an earlier part was begun with other values.
+    /// Errors of the pairs and of files; [`Error::Diverged`]; [`wake_nn::Error::InvalidOption`] without pairs for any part but
+    /// the parser, and when an earlier part was begun with other values.
     pub fn run(&mut self) -> Result<()> {
         let options = self.options.clone();
         match self.part {
@@ -160,7 +167,7 @@ impl<'a> WakeTraining<'a> {
         self.folder.path().join(name)
     }
 
-    /// How a stage is kept in the folder.
+    /// Stage of a part, stored in the folder.
     fn stage(part: Part, options: &StageOptions) -> Stage<'static> {
         Stage {
             name: part.name(),
@@ -172,7 +179,7 @@ impl<'a> WakeTraining<'a> {
         }
     }
 
-    /// What an earlier stage is told if its results are missing, older than its last checkpoint, or not done.
+    /// Options of an earlier stage whose results are missing, older than its last checkpoint, or unfinished.
     fn earlier(&self, part: Part) -> Result<Option<StageOptions>> {
         let Some(left) = self.folder.unfinished(part.name(), results(part))? else {
             return Ok(None);
@@ -204,7 +211,7 @@ impl<'a> WakeTraining<'a> {
         Ok(load(module, Layout::Diffusers, &self.out(part.file()))?)
     }
 
-    /// Encodes all pairs and the images expected of their scenes, which then stay in memory.
+    /// Encodes all pairs and the expected images of their scenes; the latents then stay in memory.
     fn latents(&mut self, transform: &PatchTransform) -> Result<Arc<LatentSet>> {
         if let Some(latents) = &self.latents {
             return Ok(latents.clone());
@@ -220,7 +227,7 @@ impl<'a> WakeTraining<'a> {
     }
 }
 
-/// Writes a part of the model as it ships.
+/// Writes a part of the model in 16 bits, as it ships.
 fn keep(part: &impl Module, path: &std::path::Path) -> Result<()> {
     Ok(save_as(part, Layout::Diffusers, path, Precision::F16)?)
 }

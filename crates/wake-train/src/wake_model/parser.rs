@@ -1,4 +1,4 @@
-//! The second part: what prompts state, read from wordings of simulated scenes.
+//! The second part: the prompt parser, trained on wordings of simulated scenes.
 
 use burn::tensor::Device;
 use serde_json::json;
@@ -13,7 +13,7 @@ use wake_dataset::{Recipe, Simulated};
 use wake_ldm::conditioning::Vocabulary;
 use wake_ldm::network::{Part, PromptParser};
 
-/// Ranges that prompts to read are drawn from, beyond those of images.
+/// Ranges of the scenes in training prompts, beyond those of images.
 const PROMPT_RANGES: [&str; 4] = [
     "draw.ship.speed = [1.0, 15.0]",
     "draw.sea.wind_speed = [1.0, 12.0]",

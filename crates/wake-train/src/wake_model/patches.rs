@@ -1,4 +1,4 @@
-//! The first part: squares of pixels as latents, in closed form.
+//! The first part: the patch transform, fitted in closed form.
 
 use serde_json::json;
 
@@ -11,11 +11,11 @@ use wake_nn::weights::{Layout, Precision, save_as};
 
 /// Images that the patch transform is fitted to.
 const FITTED: u64 = 400;
-/// Channels of a square of pixels: all of them lose nothing.
+/// Largest number of channels, which loses nothing.
 const CHANNELS: usize = 64;
 
 impl WakeTraining<'_> {
-    /// Fits the patch transform to the first 400 pairs, and writes it with what every number of channels keeps
+    /// Fits the patch transform to the first 400 pairs, and writes it with the explained variance of every number of channels
     /// (`explained_variance.json`).
     pub(super) fn fit_patches(&self) -> Result<()> {
         let (pairs, device) = (self.pairs()?, self.options.device());
@@ -51,7 +51,7 @@ impl WakeTraining<'_> {
     }
 }
 
-/// JSON has no infinity: all components lose nothing.
+/// `None` for the infinite PSNR of all channels, since JSON has no infinity.
 fn finite(number: f64) -> Option<f64> {
     Some(number).filter(|number| number.is_finite())
 }

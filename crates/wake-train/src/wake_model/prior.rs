@@ -46,7 +46,7 @@ impl WakeTraining<'_> {
     }
 }
 
-/// The mean images of some scenes.
+/// Images that the prior expects of some scenes.
 fn expected_images(
     prior: &Prior,
     patches: &PatchTransform,

@@ -1,4 +1,4 @@
-//! Blocks of the networks with weights and inputs that follow from counters.
+//! Blocks of the networks with weights and inputs drawn from seeded counters.
 
 use wake_detector::network::{INPUTS, Network};
 use wake_ldm::autoencoder::AutoencoderKlConfig;
@@ -14,21 +14,21 @@ use wake_nn::resnet::{ResnetBlock, ResnetShape};
 use wake_nn::self_check::seeded;
 use wake_nn::transformer::{Transformer2d, TransformerShape};
 
-/// Computes a block once.
+/// Closure that computes a block once.
 pub(super) type Call = Box<dyn Fn() -> Tensor<1>>;
-/// A block's call on a device, in a kind of number.
+/// Makes a block's call for a device and a number format.
 pub(super) type On = Box<dyn Fn(&Device, DType) -> Call>;
 
 /// A block of a network.
 pub(super) struct Block {
     pub(super) name: &'static str,
-    /// Calls that are timed.
+    /// Number of timed calls.
     pub(super) runs: usize,
-    /// Draws its weights.
+    /// Draws the weights.
     pub(super) make: fn() -> On,
 }
 
-/// All blocks: the layers of Stable Diffusion at its own sizes, then whole networks.
+/// All blocks: layers of Stable Diffusion at its own sizes, then whole networks.
 pub(super) const BLOCKS: &[Block] = &[
     block("residual block, 2 × 320 × 64²", 10, || {
         residual(2, 320, 64, Some(1280))
@@ -102,12 +102,12 @@ const fn block(name: &'static str, runs: usize, make: fn() -> On) -> Block {
     Block { name, runs, make }
 }
 
-/// Where weights are drawn, and what other devices are compared with.
+/// Device on which weights are drawn, and the reference for other devices.
 pub(super) fn reference() -> Device {
     Device::flex()
 }
 
-/// A seeded model with inputs of some shapes.
+/// Seeds a model, and gives it inputs of the given shapes.
 fn on<M: Module + 'static>(
     model: M,
     shapes: Vec<[usize; 4]>,
@@ -121,7 +121,7 @@ fn on<M: Module + 'static>(
     })
 }
 
-/// Inputs of variance 1.
+/// Random inputs of variance 1.
 fn inputs(shapes: &[[usize; 4]], device: &Device, dtype: DType) -> Vec<Tensor<4>> {
     let input = |(k, &[batch, channels, rows, columns]): (usize, &[usize; 4])| {
         let sources: Vec<NoiseSource> = (0..batch)
@@ -133,7 +133,7 @@ fn inputs(shapes: &[[usize; 4]], device: &Device, dtype: DType) -> Vec<Tensor<4>
     shapes.iter().enumerate().map(input).collect()
 }
 
-/// Weights in another kind of number.
+/// Converts weights to another number format.
 struct To(DType);
 
 impl ModuleMapper for To {
@@ -169,7 +169,7 @@ fn residual(batch: usize, channels: usize, side: usize, time_channels: Option<us
     )
 }
 
-/// A transformer of one layer that attends to 77 tokens of 768 channels.
+/// Transformer of one layer that attends to 77 tokens of 768 channels.
 fn transformer(channels: usize, side: usize) -> On {
     let shape = TransformerShape {
         channels,
@@ -212,7 +212,7 @@ fn text() -> On {
     )
 }
 
-/// The small U-Net of text to image.
+/// Small U-Net of text to image.
 fn small() -> UNetConfig {
     UNetConfig::small(16, Some(256), None)
 }
@@ -243,7 +243,7 @@ fn denoised(unet: &UNet, x: &[Tensor<4>]) -> Tensor<4> {
     })
 }
 
-/// The gradient of the input, for which those of all layers are computed.
+/// Gradient of the input, whose computation includes the gradients of all layers.
 #[cfg(feature = "train")]
 fn gradients() -> On {
     let config = small();

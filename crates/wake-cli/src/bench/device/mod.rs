@@ -1,4 +1,4 @@
-//! The blocks of the networks on a device, against the CPU backend flex on the same inputs.
+//! Blocks of the networks on a device, compared with the CPU backend flex on the same inputs.
 
 mod blocks;
 
@@ -13,38 +13,38 @@ use wake_nn::weights::Precision;
 use self::blocks::{BLOCKS, Block, Call, reference};
 use crate::exit::Outcome;
 
-/// Kinds of number, where the device has them.
+/// Number formats, used if the device supports them.
 const KINDS: [(&str, Precision); 3] = [
     ("f32", Precision::F32),
     ("f16", Precision::F16),
     ("bf16", Precision::BF16),
 ];
-/// Calls of flex that are timed, after one more.
+/// Timed calls of flex, after a warm-up call.
 const FLEX_RUNS: usize = 1;
 
-/// One block in one kind of number.
+/// Figures of one block in one number format.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct DeviceRow {
     pub(crate) stage: &'static str,
     pub(crate) block: &'static str,
     pub(crate) device: String,
-    /// The kind of number of weights and inputs.
+    /// Number format of weights and inputs.
     pub(crate) precision: &'static str,
-    /// Median seconds of a call on the device; `None` where it failed.
+    /// Median seconds of a call on the device; `None` if it failed.
     pub(crate) seconds: Option<f64>,
-    /// Seconds of the first call, in which kernels are compiled.
+    /// Seconds of the first call, which compiles kernels.
     pub(crate) first_seconds: Option<f64>,
     /// Median seconds of flex in f32.
     pub(crate) flex_seconds: f64,
-    /// Largest difference from flex in f32, of its largest value.
+    /// Largest difference from flex in f32, relative to its largest value.
     pub(crate) max_error: Option<f64>,
-    /// Root mean square difference, of its root mean square.
+    /// Root mean square difference from flex in f32, relative to its root mean square.
     pub(crate) rms_error: Option<f64>,
-    /// Reason for missing numbers.
+    /// Reason for missing values.
     pub(crate) failure: Option<String>,
 }
 
-/// A self-check of a crate on the device.
+/// Result of a crate's self-check on the device.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct CheckRow {
     pub(crate) stage: &'static str,
@@ -54,19 +54,19 @@ pub(crate) struct CheckRow {
     pub(crate) failure: Option<String>,
 }
 
-/// The blocks whose names contain one of `wanted`, all if there are none.
+/// The blocks whose names contain one of `wanted`, or all if `wanted` is empty.
 fn asked(wanted: &[String]) -> Vec<&'static Block> {
     let named =
         |block: &&Block| wanted.is_empty() || wanted.iter().any(|name| block.name.contains(name));
     BLOCKS.iter().filter(named).collect()
 }
 
-/// Number of times that [`measure`] says it has done something.
+/// Number of calls of `done` in [`measure`].
 pub(crate) fn parts(wanted: &[String]) -> u64 {
     asked(wanted).len() as u64
 }
 
-/// All rows; `done` hears of each block.
+/// Measures all rows and calls `done` after each block.
 pub(crate) fn measure(
     name: &str,
     wanted: &[String],
@@ -125,7 +125,7 @@ pub(crate) fn checks(name: &str) -> Outcome<Vec<CheckRow>> {
     Ok(list.iter().map(row).collect())
 }
 
-/// Numbers and seconds of a call.
+/// Result and seconds of a call.
 struct Timed {
     first: f64,
     seconds: f64,
@@ -140,7 +140,7 @@ fn timed(call: &Call, runs: usize, device: &Device) -> Outcome<Timed> {
         device.sync()?;
         Ok((begin.elapsed().as_secs_f64(), result))
     };
-    // Kernels are compiled and tuned in the first call.
+    // The first call compiles and tunes kernels.
     let (first, mut result) = once()?;
     let mut all = Vec::new();
     for _ in 0..runs {
@@ -188,8 +188,8 @@ fn row(
     }
 }
 
-/// Largest difference of the largest value, and root mean square difference of the root mean square; `None` where numbers are
-/// missing or not finite.
+/// Largest difference relative to the largest value, and root mean square difference relative to the root mean square;
+/// `None` if values are missing or not finite.
 fn errors(found: &[f32], exact: &[f32]) -> Option<(f64, f64)> {
     let (mut largest, mut difference, mut square, mut differences) = (0.0f64, 0.0f64, 0.0, 0.0);
     for (&a, &b) in found.iter().zip(exact) {
@@ -202,7 +202,7 @@ fn errors(found: &[f32], exact: &[f32]) -> Option<(f64, f64)> {
     whole.then_some(errors)
 }
 
-/// The text of a panic.
+/// First line of a panic's message.
 fn said(panic: &(dyn std::any::Any + Send)) -> String {
     let text = panic
         .downcast_ref::<String>()
@@ -215,7 +215,7 @@ fn said(panic: &(dyn std::any::Any + Send)) -> String {
         .to_owned()
 }
 
-/// The rows as a table in Markdown: milliseconds and largest errors by kind of number.
+/// Markdown table of the rows: milliseconds and largest errors by number format.
 pub(crate) fn table(rows: &[DeviceRow], checks: &[CheckRow]) -> String {
     let device = rows.first().map_or("", |row| row.device.as_str());
     let mut text = format!(
@@ -258,7 +258,7 @@ pub(crate) fn table(rows: &[DeviceRow], checks: &[CheckRow]) -> String {
 mod tests {
     use super::*;
 
-    /// One number of three that is off by a tenth of the largest; and numbers that are no numbers.
+    /// One value of three that is off by a tenth of the largest, and values that are not finite or missing.
     #[test]
     fn errors_are_of_the_largest_value_and_of_the_root_mean_square() {
         let exact = [3.0, 4.0, 0.0];

@@ -1,4 +1,4 @@
-//! σ⁰ of facets: a table against quadrature.
+//! Stage σ⁰ of facets: a table against quadrature.
 
 use super::memo::Memo;
 use super::oracle::{QUADRATURES, RUNS, at_pixels, sample};
@@ -11,8 +11,8 @@ use wake_physics::spectrum::elfouhaily::Elfouhaily;
 use wake_physics::waves::Quantity;
 use wake_physics::{Field, Raster, Scene, permittivity};
 
-/// Mean square slope of waves that pixels do not carry, times the distance astern, and its largest \[m\], \[1\]: of the
-/// size of a ship of 195 m on pixels of 2.5 m.
+/// Mean square slope of waves below the pixel size, times the distance astern \[m\], and its largest value \[1\]:
+/// typical of a ship of 195 m on pixels of 2.5 m.
 const ROUGHNESS: f64 = 2.0;
 const ROUGHEST: f64 = 0.02;
 
@@ -38,21 +38,21 @@ fn backscatter_model(spacing: f64) -> Backscatter {
     }
 }
 
-/// Table over slopes, built anew each time, against quadrature at each pixel.
+/// Table over slopes, rebuilt in every run, against quadrature at each pixel.
 pub(crate) fn backscatter(raster: &Raster, tolerance: f64, memo: &mut Memo) -> Row {
     let slopes = fields(raster, &[Quantity::SlopeX, Quantity::SlopeY]);
     let facets = FacetFields::of_slopes(&slopes[0], &slopes[1]);
-    // A sample on every raster, and the same for every tolerance.
+    // A sample for every raster size, the same for every tolerance.
     let pixels = sample(raster, QUADRATURES);
     by_quadrature("backscatter", (raster, tolerance), &facets, &pixels, memo)
 }
 
-/// σ⁰ where waves of a ship roughen the sea that pixels do not carry: means over nodes of the table against quadrature over
-/// all slopes, at pixels that have any.
+/// σ⁰ where waves of a ship roughen the sea below the pixel size: means over nodes of the table against quadrature over
+/// all slopes, at pixels with such waves.
 pub(crate) fn unresolved(raster: &Raster, tolerance: f64, memo: &mut Memo) -> Row {
     let slopes = fields(raster, &[Quantity::SlopeX, Quantity::SlopeY]);
     let track = wake().track;
-    // Divergent waves, which run away from the track.
+    // Divergent waves, which propagate away from the track.
     let of_pixel = |i: usize, j: usize| {
         let [ahead, port] = track.seen_from_ship([raster.x(j), raster.y(i)]);
         let variance = if port.abs() < -0.2 * ahead {
@@ -74,7 +74,7 @@ pub(crate) fn unresolved(raster: &Raster, tolerance: f64, memo: &mut Memo) -> Ro
     by_quadrature("unresolved", (raster, tolerance), &facets, &pixels, memo)
 }
 
-/// The table of some facets against quadrature at some pixels.
+/// The table for some facets against quadrature at some pixels.
 fn by_quadrature(
     stage: &'static str,
     (raster, tolerance): (&Raster, f64),

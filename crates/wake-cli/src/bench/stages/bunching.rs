@@ -1,4 +1,4 @@
-//! Imaging of a moving sea: scattered kernels against the dense integral.
+//! Stage of imaging a moving sea: scattered kernels against the dense integral.
 
 use super::oracle::{RUNS, at_pixels, pixels};
 use super::surface::{INCIDENCE, fields};

@@ -1,4 +1,4 @@
-//! The edges of a turbulent wake against the integral over what their waves met.
+//! Stage of the edges of a turbulent wake: an approximation against the integral along the history of the waves.
 
 use super::oracle::{QUADRATURES, RUNS, row, sample};
 use crate::bench::row::{Errors, Row, median_seconds, seconds};
@@ -9,13 +9,13 @@ use wake_physics::{Field, Raster, Track};
 
 /// Size of a pixel \[m\].
 const PIXEL: f64 = 10.0;
-/// Share of σ⁰ from breaking waves, as behind a wake at VV, the wind [m/s], and the response over the time of relaxation.
+/// Share of σ⁰ from breaking waves, as behind a wake at VV; wind speed [m/s]; ratio of response to relaxation time.
 const SHARE: f64 = 0.2;
 const WIND: f64 = 5.0;
 const CHANGE_OF_BREAKING: f64 = 13.5;
 
-/// The edges of a turbulent wake, whose breaking waves are taken to have answered to the current where they are, against the
-/// integral over what they met since the ship passed, at pixels near the track.
+/// Edges of a turbulent wake: breaking waves in equilibrium with the local current, against the integral over the
+/// current that they met since the ship passed, at pixels near the track.
 pub(crate) fn edge(size: usize) -> Row {
     let raster = Raster::image(size, size, PIXEL);
     let k_e = std::f64::consts::TAU * 9.6e9 / 299_792_458.0;
@@ -57,7 +57,7 @@ pub(crate) fn edge(size: usize) -> Row {
     row("edge", &raster, None, fast_seconds, oracle, errors)
 }
 
-/// ∫ f from 0 to an end, by Simpson's rule on 1,000 steps.
+/// ∫ f from 0 to `end`, by Simpson's rule with 1,000 steps.
 fn simpson(end: f64, f: impl Fn(f64) -> f64) -> f64 {
     let count = 1000;
     let step = end / f64::from(count);

@@ -1,4 +1,4 @@
-//! The stages: each with its fast method, its oracle and what their difference is measured against.
+//! The stages, each with its fast method, its oracle and the scale of its error.
 
 mod backscatter;
 mod bunching;
@@ -27,7 +27,7 @@ pub(crate) const STAGES: [&str; 9] = [
     "scene",
 ];
 
-/// Whether the method of a stage has a tolerance; the others are measured once a size.
+/// Whether the method of a stage has a tolerance; the others are measured once per size.
 pub(crate) fn has_tolerance(stage: &str) -> bool {
     !["edge", "response"].contains(&stage)
 }

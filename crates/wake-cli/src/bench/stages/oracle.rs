@@ -1,4 +1,4 @@
-//! Where the oracles run, and the row that comes of it.
+//! Pixels of the oracles, and rows of their results.
 
 use crate::bench::row::{Errors, Row};
 use rand::rngs::StdRng;
@@ -7,14 +7,14 @@ use wake_physics::{Field, Raster};
 
 /// Runs of a fast method, and of a short matrix product.
 pub(crate) const RUNS: usize = 5;
-/// Pixels of the oracle where the whole raster takes too long.
+/// Pixels of an oracle if the whole raster takes too long.
 const SAMPLE: usize = 4_096;
 /// Pixels of the quadrature of σ⁰, which takes a millisecond each.
 pub(crate) const QUADRATURES: usize = 1_024;
-/// Largest raster, as pixels along a side, on which the oracles run whole.
+/// Largest raster, as pixels along a side, on which the oracles run on all pixels.
 pub(crate) const WHOLE: usize = 128;
 
-/// The pixels of the oracle, and how many times more there are.
+/// Pixels of the oracle, and the ratio of all pixels to these.
 pub(crate) fn pixels(raster: &Raster) -> (Vec<[usize; 2]>, f64) {
     if raster.rows <= WHOLE {
         let all = (0..raster.len()).map(|n| [n / raster.columns, n % raster.columns]);
@@ -53,7 +53,7 @@ pub(crate) fn row(
     }
 }
 
-/// A row of a field against exact values at some of its pixels, relative to its mean.
+/// A row that compares a field with exact values at some of its pixels, relative to its mean.
 pub(crate) fn at_pixels(
     stage: &'static str,
     (raster, tolerance): (&Raster, Option<f64>),

@@ -1,4 +1,4 @@
-//! The image as a satellite delivers it: through its impulse response.
+//! Stage of the impulse response of a satellite image.
 
 use super::oracle::{QUADRATURES, RUNS, at_pixels, sample};
 use super::surface::fields;
@@ -10,16 +10,16 @@ use wake_physics::waves::Quantity;
 use wake_physics::window::Window;
 use wake_physics::{Field, Raster};
 
-/// Pixels of the image, two sources a pixel, and the resolution along both axes \[m\].
+/// Pixel spacing of the image, with two sources per pixel, and resolution along both axes \[m\].
 const PIXEL: f64 = 10.0;
 const RESOLUTION: f64 = 20.0;
-/// Sources that the direct sum over the response looks at, over all pixels.
+/// Number of sources in the direct sum, over all pixels.
 const SCATTERERS: usize = 1 << 29;
-/// How much farther from the image the direct sum looks than the fast method.
+/// Margin of the direct sum around the image, relative to the fast method's.
 const FARTHER: usize = 4;
 
-/// The mean image through the response by FFTs against the sum over scatterers with its closed form, which looks four times
-/// as far beyond the image.
+/// Mean image through the impulse response by FFTs, against the sum over scatterers with the closed-form response,
+/// which includes scatterers four times as far beyond the image.
 pub(crate) fn response(size: usize) -> Row {
     let axis = Axis {
         resolution: RESOLUTION,

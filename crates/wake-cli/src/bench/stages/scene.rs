@@ -1,4 +1,4 @@
-//! The whole simulation against the oracles of all stages.
+//! Stage of the whole simulation against the oracles of all stages.
 
 use std::collections::btree_map::Entry;
 
@@ -7,12 +7,12 @@ use super::oracle::{RUNS, row, sample};
 use crate::bench::row::{Errors, Row, median_seconds};
 use wake_physics::{Scene, direct_intensity, simulate};
 
-/// Tolerance of the direct simulation: its nodes of the wake stand for all others, and it leaves out no term.
+/// Tolerance of the direct simulation: its wake nodes are the reference for all others, and no term is left out.
 const STRICTEST: f64 = 1e-6;
 
 /// The whole simulation against the oracles of all stages at random pixels of the same image, with all terms and at the
-/// strictest tolerance. Sums of waves and σ⁰ are scaled from the source pixels that reach them to all source pixels,
-/// imaging from the pixels to all pixels.
+/// strictest tolerance. Times of wave sums and σ⁰ are scaled from the source pixels that contribute to all source
+/// pixels, and times of imaging from the sampled pixels to all pixels.
 pub(crate) fn scene(size: usize, tolerance: f64, memo: &mut Memo) -> wake_physics::Result<Row> {
     let mut scene = Scene::default();
     (scene.grid.rows, scene.grid.columns) = (size, size);
@@ -44,7 +44,7 @@ pub(crate) fn scene(size: usize, tolerance: f64, memo: &mut Memo) -> wake_physic
     ))
 }
 
-/// Pixels of the oracle of the scene: fewer of a large image, whose sea has more waves.
+/// Pixels of the scene's oracle: fewer for a large image, whose sea has more waves.
 fn scene_pixels(size: usize) -> usize {
     ((1 << 23) / (size * size).max(1 << 18)).max(4)
 }

@@ -1,4 +1,4 @@
-//! The sea and the wake that the stages are measured on.
+//! Sea and wake on which the stages are measured.
 
 use wake_physics::hull::Hull;
 use wake_physics::kelvin::KelvinWake;
@@ -40,7 +40,7 @@ pub(crate) fn wake() -> KelvinWake {
     }
 }
 
-/// Surface and wake together: slopes, and what the imaging needs.
+/// Fields of sea and wake together.
 pub(crate) fn fields(raster: &Raster, quantities: &[Quantity]) -> Vec<Field> {
     let mut fields = Surface::new(&spectrum(), 7, 0.0, raster).fields(&TRANSFER, quantities, 1e-4);
     let wake = wake();

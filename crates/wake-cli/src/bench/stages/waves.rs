@@ -1,4 +1,4 @@
-//! Sums of plane waves: sea, swell and wake.
+//! Stages that sum plane waves: sea, swell and wake.
 
 use super::oracle::{RUNS, WHOLE, pixels, row};
 use super::surface::{TRANSFER, spectrum, wake};
@@ -8,12 +8,12 @@ use wake_physics::swell::Swell;
 use wake_physics::waves::{PlaneWaves, Quantity, harmonic_sum};
 use wake_physics::{Field, Raster, reference};
 
-/// Waves of sea and wake that the harmonic sum adds: chosen.
+/// Number of waves of sea and of wake in the harmonic sum: chosen.
 const WAVES: usize = 10_000;
-/// Rows of a matrix product on a large raster, scaled up.
+/// Rows of the matrix product on a large raster, whose time is scaled up.
 const PRODUCT_ROWS: usize = 48;
 
-/// The six fields of surface and velocity.
+/// The six fields of elevation, slope and velocity.
 const QUANTITIES: [Quantity; 6] = [
     Quantity::Elevation,
     Quantity::SlopeX,
@@ -23,14 +23,14 @@ const QUANTITIES: [Quantity; 6] = [
     Quantity::VelocityZ,
 ];
 
-/// FFT of the sea with its strongest waves.
+/// Sea by FFT with its strongest waves, against the harmonic sum.
 pub(crate) fn sea(raster: &Raster, tolerance: f64) -> Row {
     let surface = Surface::new(&spectrum(), 7, 0.0, raster).strongest(WAVES);
     let fast = || surface.fields(&TRANSFER, &QUANTITIES, tolerance);
     sum("sea", raster, tolerance, &surface.modes(), fast)
 }
 
-/// Swell on the non-uniform FFT, its draw included, against the harmonic sum.
+/// Swell by the non-uniform FFT, including its random draw, against the harmonic sum.
 pub(crate) fn swell(raster: &Raster, tolerance: f64) -> Row {
     let swell = Swell {
         height: 2.0,
@@ -42,7 +42,7 @@ pub(crate) fn swell(raster: &Raster, tolerance: f64) -> Row {
     sum("swell", raster, tolerance, &draw(), fast)
 }
 
-/// Non-uniform FFT of the wake, nodes and their amplitudes included.
+/// Wake by the non-uniform FFT, including its nodes and amplitudes, against the harmonic sum.
 pub(crate) fn kelvin(raster: &Raster, tolerance: f64) -> Row {
     let wake = wake();
     let waves = wake.waves(&wake.plan(raster, tolerance)).strongest(WAVES);
@@ -85,7 +85,7 @@ fn sum(
     }
 }
 
-/// Seconds of the matrix product, on some rows of a large raster, and its fields.
+/// Seconds of the matrix product, scaled up from some rows of a large raster, and its fields.
 fn product(raster: &Raster, waves: &PlaneWaves) -> (f64, Vec<Field>) {
     let whole = raster.rows <= WHOLE;
     let rows = if whole { raster.rows } else { PRODUCT_ROWS };

@@ -1,4 +1,5 @@
-//! `wake evaluate calibration`: probabilities of the detector's scores, fitted and checked on images that no training shows.
+//! `wake evaluate calibration`: fits and checks probabilities for the detector's scores, on images that no training
+//! uses.
 
 mod report;
 
@@ -16,40 +17,40 @@ use crate::exit::{self, Outcome};
 use crate::progress;
 use report::{Check, Mode, Report};
 
-/// Fit probabilities of the detector's scores, and check them on other images.
+/// Fit probabilities to the detector's scores, and check them on other images.
 #[derive(clap::Args, Debug, Clone)]
 pub(crate) struct Options {
-    /// Images of each recipe that the probabilities are fitted on, and as many of sea without ships
+    /// Number of images per recipe for the fit, and of images of sea without ships
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(100..=100_000))]
     images: u32,
-    /// Images of each recipe that they are checked on
+    /// Number of images per recipe for the check
     #[arg(long, default_value_t = 500, value_parser = clap::value_parser!(u32).range(100..=100_000))]
     checked: u32,
-    /// False alarms per 1,000 km² of simulated sea without ships that sure detections may have
+    /// Largest rate of false alarms of sure detections, per 1,000 km² of simulated sea without ships
     #[arg(long, default_value_t = FALSE_ALARMS)]
     false_alarms: f64,
-    /// Folder of real tiles with labels.json, which are then searched, too
+    /// Also search the real tiles in this folder, which has labels.json
     #[arg(long, value_name = "DIR")]
     real: Option<PathBuf>,
-    /// Weights of the network, by default those in the repository; their calibration is written beside them, too
+    /// Weights of the network, beside which the calibration is written as well [default: the shipped weights]
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
-    /// flex, ndarray, wgpu or cuda, where compiled in
+    /// Device: flex, ndarray, wgpu or cuda, if compiled in
     #[arg(long, default_value = "flex")]
     device: String,
-    /// Folder of the results, made if absent
+    /// Folder for the results, created if absent
     #[arg(long, value_name = "DIR", default_value = "out/calibration")]
     out: PathBuf,
 }
 
-/// Seeds of what is fitted and of the sea without ships; no run trains on them.
+/// Seeds of the images for the fit and of the sea without ships, which no training uses.
 const FITTED: u64 = 900_101;
 const EMPTY: u64 = 900_201;
-/// False alarms per 1,000 km² from sure detections: chosen.
+/// Default rate of false alarms of sure detections per 1,000 km²: chosen.
 const FALSE_ALARMS: f64 = 1.0;
-/// Detections with lower scores are no part of any figure.
+/// Detections with lower scores are not part of any figure.
 const LEAST_SCORE: f32 = 0.01;
-/// Spacing that painted images are searched with \[m\]: their speckle is that of pixels of ten metres.
+/// Spacing with which painted images are searched \[m\]; their speckle is that of pixels of ten metres.
 const PAINTED: f32 = 10.0;
 
 /// Writes `detector.calibration.json`, `report.md` and `report.json` into the folder.
@@ -109,7 +110,7 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
     ))?)
 }
 
-/// The recipes that probabilities are fitted on, as many images each.
+/// Recipes for the fit, with equal numbers of images.
 const RECIPES: [ImageRecipe; 2] = [ImageRecipe::Detector, ImageRecipe::Painted];
 
 /// Searches images of each recipe, with known and with unknown spacing.
@@ -147,7 +148,8 @@ fn unknown(_: &Scene) -> Option<f32> {
     None
 }
 
-/// The probabilities of highest likelihood, and the score that allows so many false alarms per 1,000 km² of sea.
+/// Fits the probabilities by maximum likelihood, and finds the score with the given rate of false alarms per 1,000 km²
+/// of sea.
 fn fit(outcomes: &[DetectionOutcome], empty: &KnownImages, false_alarms: f64) -> Probabilities {
     let scores: Vec<(f64, bool)> = outcomes.iter().map(report::by_score).collect();
     let directions: Vec<(f64, bool)> = outcomes.iter().filter_map(report::by_direction).collect();

@@ -16,14 +16,14 @@ use whole_files::{write_atomically, write_json};
 
 use crate::exit::Outcome;
 
-/// Everything that the report says.
+/// Contents of the report.
 #[derive(Debug, Serialize)]
 pub(super) struct Report {
-    /// Images of each recipe that were fitted on, and as many of sea without ships.
+    /// Images per recipe for the fit, and of sea without ships.
     pub(super) images: u64,
-    /// Images of each recipe that were checked on.
+    /// Images per recipe for the check.
     pub(super) checked: u64,
-    /// False alarms per 1,000 km² that were asked for.
+    /// Requested rate of false alarms per 1,000 km².
     pub(super) false_alarms: f64,
     /// CRC-32 of the weights.
     pub(super) weights: String,
@@ -31,22 +31,22 @@ pub(super) struct Report {
     pub(super) tiles: Option<Tiles>,
 }
 
-/// One way of searching: with known or with unknown pixel spacing.
+/// Figures with known or with unknown pixel spacing.
 #[derive(Debug, Serialize)]
 pub(super) struct Mode {
     name: &'static str,
     pub(super) probabilities: Probabilities,
     checks: Vec<Check>,
-    /// Sure detections on sea without ships: all, and by what the sea is like.
+    /// Sure detections on sea without ships: all, and by wind, sensor and slicks.
     empty: EmptySea,
     by_wind: Vec<(String, EmptySea)>,
     by_sensor: Vec<(String, EmptySea)>,
     by_slicks: Vec<(String, EmptySea)>,
-    /// Recall of sure detections on simulated images: any wake, and those above 1 dB.
+    /// Recall and precision of sure detections on the simulated images, by recipe.
     operating: Vec<Operating>,
 }
 
-/// Reliability of both probabilities on some images.
+/// Reliability of both probabilities on a set of images.
 #[derive(Debug, Serialize)]
 pub(super) struct Check {
     name: String,
@@ -54,7 +54,7 @@ pub(super) struct Check {
     direction: Option<Reliability>,
 }
 
-/// Sure detections on some images.
+/// Performance of sure detections on a set of images.
 #[derive(Debug, Serialize)]
 struct Operating {
     average_precision: Option<f64>,
@@ -62,22 +62,22 @@ struct Operating {
     precision: f64,
 }
 
-/// The real tiles.
+/// Figures on real tiles.
 #[derive(Debug, Serialize)]
 pub(super) struct Tiles {
     count: usize,
     megapixels: f64,
     check: Check,
-    /// 95 % intervals over the tiles of the calibration error, and of the Brier score less that of a constant.
+    /// 95 % intervals over the tiles of the calibration error, and of the Brier score minus that of a constant.
     calibration_error: Option<[f64; 2]>,
     brier_less_constant: Option<[f64; 2]>,
-    /// Detections that are sure and no wake.
+    /// Sure detections that are not wakes.
     false_alarms: usize,
-    /// Sure wakes and labelled ones.
+    /// Sure detections that are wakes, and labelled wakes.
     found: [usize; 2],
 }
 
-/// Bounds of the wind \[m/s\].
+/// Limits of the wind classes \[m/s\].
 const WINDS: [f64; 6] = [2.0, 4.0, 6.0, 8.0, 10.0, 12.0];
 
 /// Score of a detection, and whether it is a wake.
@@ -85,7 +85,7 @@ pub(super) fn by_score(one: &DetectionOutcome) -> (f64, bool) {
     (f64::from(one.detection.score), one.wake)
 }
 
-/// Evidence for the direction of a wake, and whether the direction is right.
+/// Evidence for the direction of a wake, and whether the direction is correct.
 pub(super) fn by_direction(one: &DetectionOutcome) -> Option<(f64, bool)> {
     let forward = 0.5 * (1.0 + f64::from(one.detection.forward?));
     Some((forward, one.direction?))
@@ -119,7 +119,7 @@ fn wake(probabilities: &Probabilities, one: &DetectionOutcome) -> (f64, bool) {
 }
 
 impl Mode {
-    /// - `checked`: the images of each recipe, the simulated ones first
+    /// - `checked`: the images of each recipe, simulated ones first
     pub(super) fn of(
         name: &'static str,
         probabilities: Probabilities,
@@ -189,7 +189,8 @@ impl Operating {
 }
 
 impl Report {
-    /// Checks the probabilities of images of unknown spacing on real tiles: clear and probable wakes count, doubtful ones are ignored.
+    /// Checks the probabilities for unknown spacing on real tiles; clear and probable wakes count, doubtful ones are
+    /// ignored.
     pub(super) fn check_tiles(&mut self, tiles: &[Tile], found: &[Vec<Detection>]) {
         let probabilities = self.modes[1].probabilities;
         let judged: Vec<Judged> = tiles.iter().map(|tile| tile.probable.clone()).collect();
@@ -217,7 +218,7 @@ impl Report {
         });
     }
 
-    /// Writes the calibration and the report into a folder, and the calibration beside weights of one's own.
+    /// Writes the calibration and the report into a folder, and the calibration beside the weights if they are given.
     pub(super) fn write(
         &self,
         folder: &Path,
@@ -313,7 +314,7 @@ impl Mode {
     }
 }
 
-/// Figures of both probabilities, a row each set of images.
+/// Writes the figures of both probabilities, one row per set of images.
 fn summary(text: &mut String, checks: &[Check]) {
     text.push_str("| images | probability of | detections | calibration error | Brier | Brier of a constant |\n| --- | --- | --- | --- | --- | --- |\n");
     for check in checks {
@@ -332,7 +333,7 @@ fn summary(text: &mut String, checks: &[Check]) {
     }
 }
 
-/// A table with a column for each set of images: mean probability, share that was right, and how many.
+/// Writes a table with a column per set of images: mean probability, observed share, and count.
 fn reliability(text: &mut String, checks: &[Check], found: &[Option<&Reliability>]) {
     let names: Vec<&str> = checks.iter().map(|check| check.name.as_str()).collect();
     let _ = writeln!(

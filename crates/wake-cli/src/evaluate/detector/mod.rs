@@ -1,4 +1,4 @@
-//! `wake evaluate detector`: how well wakes are found in simulated images that were held out, and in real tiles.
+//! `wake evaluate detector`: evaluates detectors on held-out simulated images and on real tiles.
 
 mod plot;
 pub(crate) mod real;
@@ -23,30 +23,30 @@ use report::Report;
 /// Evaluate the detector on held-out simulated images and on real tiles.
 #[derive(clap::Args, Debug, Clone)]
 pub(crate) struct Options {
-    /// Simulated images of each recipe
+    /// Number of simulated images per recipe
     #[arg(long, default_value_t = 500, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     images: u32,
-    /// Folder of real tiles with labels.json, to be searched too
+    /// Also search the real tiles in this folder, which has labels.json
     #[arg(long, value_name = "DIR")]
     real: Option<PathBuf>,
-    /// Weights of the network, by default those in the repository
+    /// Weights of the network [default: the shipped weights]
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
     /// Weights of another training, as a row of the transfer table; may be repeated
     #[arg(long, value_name = "NAME=FILE", value_parser = rung)]
     rung: Vec<(String, PathBuf)>,
-    /// Trainings that each left out a tile: evaluates TILE with DIR/TILE/detector.safetensors; may be repeated
+    /// Leave-one-out trainings: evaluate each TILE with DIR/TILE/detector.safetensors; may be repeated
     #[arg(long, value_name = "NAME=DIR", value_parser = rung, requires = "real")]
     left_out: Vec<(String, PathBuf)>,
-    /// flex, ndarray, wgpu or cuda, where compiled in
+    /// Device: flex, ndarray, wgpu or cuda, if compiled in
     #[arg(long, default_value = "flex")]
     device: String,
-    /// Folder of the results, made if absent
+    /// Folder for the results, created if absent
     #[arg(long, value_name = "DIR", default_value = "out/evaluate_detector")]
     out: PathBuf,
 }
 
-/// A name and a file.
+/// Parses a name and a path.
 fn rung(text: &str) -> Result<(String, PathBuf), String> {
     match text.split_once('=') {
         Some((name, file))
@@ -60,14 +60,14 @@ fn rung(text: &str) -> Result<(String, PathBuf), String> {
 
 /// Rows and columns of a simulated image.
 pub(crate) const SIZE: usize = 512;
-/// Scores below this are no part of any curve.
+/// Detections with lower scores are not part of any curve.
 const LEAST_SCORE: f32 = 0.01;
-/// Contrast from which on a simulated wake is clear \[dB\].
+/// Contrast above which a simulated wake is clear \[dB\].
 const CLEAR: f64 = 1.0;
-/// Images drawn of each recipe.
+/// Number of pictures per recipe.
 const PICTURES: usize = 24;
 
-/// Searches, and writes `report.md`, `report.json`, `recall.csv`, a plot and pictures into the folder.
+/// Searches, and writes `report.md`, `report.json`, `recall.csv`, plots and pictures into the folder.
 pub(crate) fn run(options: &Options) -> Outcome<()> {
     let network = |weights: Option<&Path>| -> Outcome<Box<dyn Finder>> {
         let detector = named::network(weights, &options.device, LEAST_SCORE)?;
@@ -78,7 +78,7 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
         ("Radon", Box::new(Radon)),
     ];
     for (name, file) in &options.rung {
-        // Pictures bear these names, in small letters.
+        // File names of pictures contain these names in lower case.
         if finders
             .iter()
             .any(|(other, _)| other.eq_ignore_ascii_case(name))
@@ -129,7 +129,7 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
     Ok(exit::say(&format!("{speeds}{}", report.text()))?)
 }
 
-/// Adds the rows of a recipe, and draws its first images; gives a line with the speed of the search.
+/// Adds the rows of a recipe and draws its first images; returns a line with the speed of the search.
 fn simulated(
     finders: &[(&str, Box<dyn Finder>)],
     recipe: ImageRecipe,

@@ -1,4 +1,4 @@
-//! Average precision by what a network was trained on.
+//! Plot of average precision by training data.
 
 use std::path::Path;
 
@@ -6,11 +6,11 @@ use plotters::prelude::*;
 
 use crate::exit::Outcome;
 
-/// On simulated and on real images.
+/// Colours of simulated and real images.
 const COLOURS: [RGBColor; 2] = [RGBColor(31, 119, 180), RGBColor(214, 39, 40)];
 const NAMES: [&str; 2] = ["simulated wakes above 1 dB", "real tiles, clear wakes"];
 
-/// A line for each training with its average precision on simulated and on real images.
+/// Plots one line per training with its average precision on simulated and on real images.
 pub(crate) fn transfer(path: &Path, trainings: &[(String, [f64; 2])]) -> Outcome<()> {
     let area = SVGBackend::new(path, (760, 120 + 28 * trainings.len() as u32)).into_drawing_area();
     area.fill(&WHITE)?;
@@ -71,7 +71,7 @@ mod tests {
         for (name, _) in &trainings {
             assert!(drawn.contains(name.as_str()), "{name}");
         }
-        // Two of each training, and two of the legend.
+        // Two for each training, and two in the legend.
         assert_eq!(drawn.matches("<circle").count(), 2 * 3 + 2);
     }
 }

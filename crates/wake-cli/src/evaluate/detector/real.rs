@@ -1,4 +1,4 @@
-//! Real tiles with labels, searched.
+//! Evaluates detectors on labelled real tiles.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use super::report::Report;
 use crate::exit::Outcome;
 use crate::picture;
 
-/// The tiles of a folder with their labels.
+/// Reads the tiles of a folder with their labels.
 pub(crate) fn tiles(folder: &Path) -> Outcome<Vec<Tile>> {
     Tile::read_all(folder).map_err(|error| match error {
         wake_train::Error::Detector(wake_detector::Error::Io { .. })
@@ -21,9 +21,9 @@ pub(crate) fn tiles(folder: &Path) -> Outcome<Vec<Tile>> {
     })
 }
 
-/// Adds the rows of a finder, or of one for each tile, and draws every tile into the folder.
+/// Adds the rows of one detector, or of one per tile, and draws every tile into the folder.
 ///
-/// - `finder`: of a tile by its number
+/// - `finder`: detector of a tile, by its number
 pub(crate) fn judge<'a>(
     name: &str,
     finder: impl Fn(usize) -> &'a (dyn Finder + 'a) + Sync,

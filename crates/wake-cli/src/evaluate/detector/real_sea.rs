@@ -1,4 +1,4 @@
-//! Whether a small network tells the open sea of real tiles from a simulated one.
+//! Classifier two-sample tests between the open sea of real tiles and simulated seas.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -15,14 +15,14 @@ use wake_train::{TwoSampleOptions, classifier_two_sample_test};
 
 use crate::exit::Outcome;
 
-/// Seed of held-out images: no run trains on it.
+/// Seed of held-out images, which no training uses.
 pub(crate) const HELD_OUT: u64 = 900_001;
 /// Rows and columns of a window of open sea.
 const WINDOW: usize = 128;
-/// Windows of each half of a tile, at most.
+/// Most windows of each half of a tile.
 const OF_A_HALF: usize = 4;
 
-/// Windows of open sea of the tiles of a folder, without what `NAME_mask.png` marks.
+/// Windows of open sea in the tiles of a folder, without pixels marked in `NAME_mask.png`.
 pub(crate) fn windows(folder: &Path, tiles: &[Tile]) -> Outcome<Vec<Field>> {
     let mut windows = Vec::new();
     for tile in tiles {
@@ -43,7 +43,7 @@ fn field(values: Vec<f32>) -> Field {
     }
 }
 
-/// As many windows of a source.
+/// Windows of a source, as many as `count`.
 fn simulated(source: &Arc<dyn Source>, count: usize) -> Outcome<Vec<Field>> {
     let pairs = source.items(0..count as u64)?;
     let levels = |pair: wake_dataset::Pair| {
@@ -53,7 +53,8 @@ fn simulated(source: &Arc<dyn Source>, count: usize) -> Outcome<Vec<Field>> {
     Ok(pairs.into_iter().map(levels).collect())
 }
 
-/// Accuracy of a classifier of real windows and those of each recipe, and of the recipe and itself: the floor.
+/// Accuracy of a classifier between real windows and each simulated sea, and between two draws of one recipe as the
+/// floor.
 pub(crate) fn told_apart(real: &[Field]) -> Outcome<Vec<Value>> {
     let device = device_named("flex")?;
     let sea = |plain: bool, seed: u64| -> Outcome<Vec<Field>> {
@@ -83,7 +84,7 @@ pub(crate) fn told_apart(real: &[Field]) -> Outcome<Vec<Value>> {
     rows.into_iter().map(row).collect()
 }
 
-/// A table of how often a small network tells one sea from another.
+/// Table of the accuracies.
 pub(crate) fn table(rows: &[Value]) -> String {
     let mut text = "\n## The open sea\n\nAccuracy of a small network, trained on windows of the left halves of the real tiles, on patches of 64² \
          pixels of the right halves (docs/reports/evaluation.md; 0.5: indistinguishable).\n\n\

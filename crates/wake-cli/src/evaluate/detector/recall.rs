@@ -1,4 +1,4 @@
-//! Recall by what wakes and their scenes are like.
+//! Recall by properties of wakes and scenes.
 
 use std::fmt::Write;
 
@@ -12,18 +12,18 @@ use wake_train::detector::judging::Searched;
 /// False alarms per image at which recall is reported.
 pub(crate) const FALSE_ALARMS: f64 = 0.5;
 
-/// Bounds of the visibility of wakes that are counted together \[dB\]: contrast of simulated ones, signal over noise of
-/// painted ones.
+/// Limits of the visibility classes of wakes \[dB\]: contrast of simulated wakes, signal-to-noise ratio of painted
+/// ones.
 const CONTRASTS: [f64; 7] = [0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 20.0];
 const SIGNALS: [f64; 7] = [15.0, 18.0, 21.0, 24.0, 28.0, 32.0, 40.0];
-/// Bounds of the wind \[m/s\], and of the angle between a wake and the flight \[deg\].
+/// Limits of the classes of wind \[m/s\], and of the angle between wake and flight \[deg\].
 const WINDS: [f64; 6] = [2.0, 4.0, 6.0, 8.0, 10.0, 12.0];
 const ANGLES: [f64; 4] = [0.0, 30.0, 60.0, 91.0];
 
-/// Finders whose recall stands in the report: the network and the classical detector. Those of other runs are in the CSV file.
+/// Number of detectors in the report: the network and the classical detector. All are in the CSV file.
 const SHOWN: usize = 2;
 
-/// Recall as tables in Markdown, and of all finders as lines of CSV.
+/// Recall as Markdown tables, and as CSV lines for all detectors.
 #[derive(Debug, Default)]
 pub(crate) struct Recall {
     pub(crate) text: String,
@@ -37,11 +37,11 @@ impl Recall {
     }
 }
 
-/// Recall at the score that allows half a false alarm an image.
+/// Recall at the score that allows half a false alarm per image.
 ///
-/// - `images`, `by`: the recipe, and the quantity of the columns with its unit
-/// - `value`: of a wake, by the numbers of its image and of the wake in it
-/// - `bounds`: of the columns
+/// - `images`, `by`: name of the recipe, and quantity of the columns with its unit
+/// - `value`: value of a wake, by the numbers of its image and of the wake in it
+/// - `bounds`: limits of the columns
 fn table(
     [images, by]: [&str; 2],
     columns: &[String],
@@ -99,7 +99,7 @@ pub(crate) fn by_visibility(recipe: ImageRecipe, finders: &[&str], searched: &Se
     table(title, &spans(&bounds), &bounds, (finders, searched), value)
 }
 
-/// Tables of recall by sensor, wind, and the angle between a wake and the flight of the radar, which is along the image's rows.
+/// Tables of recall by sensor, wind, and the angle between wake and flight, which is upward in the image.
 pub(crate) fn by_scene(recipe: ImageRecipe, finders: &[&str], searched: &Searched) -> Recall {
     let scene = |image: usize| -> &Scene { &searched.scenes[image] };
     let used = |sensor: &Sensor| {
@@ -136,7 +136,7 @@ pub(crate) fn by_scene(recipe: ImageRecipe, finders: &[&str], searched: &Searche
     recall
 }
 
-/// The name of a sensor in scene files.
+/// Name of a sensor in scene files.
 fn name(sensor: &Sensor) -> String {
     let name = serde_json::to_value(sensor).ok();
     let name = name.and_then(|name| name.as_str().map(str::to_owned));

@@ -1,4 +1,4 @@
-//! What `evaluate` writes.
+//! Report of `wake evaluate detector`.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -12,11 +12,11 @@ use super::recall::{FALSE_ALARMS, Recall};
 use super::{plot, real_sea};
 use crate::exit::Outcome;
 
-/// One row a finder and set of images.
+/// Figures, one row per detector and set of images.
 #[derive(Default)]
 pub(crate) struct Report {
     pub(crate) rows: Vec<Value>,
-    /// Names of other runs.
+    /// Names of other trainings.
     pub(crate) rungs: Vec<String>,
     /// Accuracies of the two-sample test.
     pub(crate) sea: Vec<Value>,
@@ -27,7 +27,7 @@ pub(crate) struct Report {
 }
 
 impl Report {
-    /// Adds a row, and gives the curve by the ray rule.
+    /// Adds a row.
     pub(crate) fn add(&mut self, set: &str, finder: &str, images: &[Judged]) {
         let (rays, boxes) = (Curve::new(images, Rule::Ray), Curve::new(images, Rule::Box));
         let (right, wrong) = rays.totals();
@@ -40,7 +40,7 @@ impl Report {
         }));
     }
 
-    /// Writes `report.json`, `report.md`, `recall.csv` and, with other runs, `transfer.svg` into a folder.
+    /// Writes `report.json`, `report.md`, `recall.csv` and, with other trainings, `transfer.svg` into a folder.
     pub(crate) fn write(&self, folder: &Path) -> Outcome<()> {
         let rows = format!("{:#}\n", json!({"rows": self.rows, "sea": self.sea}));
         let recall = format!(
@@ -62,13 +62,13 @@ impl Report {
         Ok(())
     }
 
-    /// The row of a set of images and a finder.
+    /// The row of a set of images and a detector.
     fn row(&self, images: &str, finder: &str) -> Option<&Value> {
         let found = |row: &&Value| row["images"] == images && row["finder"] == finder;
         self.rows.iter().find(found)
     }
 
-    /// Average precision on simulated and on real images of other runs and of the network.
+    /// Average precision on simulated and on real images, of other trainings and of the network.
     fn dots(&self) -> Vec<(String, [f64; 2])> {
         let finders = self.rungs.iter().map(String::as_str).chain(["network"]);
         let dot = |finder: &str| {
@@ -163,7 +163,7 @@ impl Report {
         text
     }
 
-    /// A table of average precision by what the images of training showed, a column each set of images.
+    /// Table of average precision by training images, one column per set of images.
     fn transfer(&self) -> String {
         let mut sets: Vec<&Value> = Vec::new();
         for row in &self.rows {

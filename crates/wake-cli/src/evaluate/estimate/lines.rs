@@ -1,4 +1,4 @@
-//! Results of each image, a line each.
+//! Results, one line per image.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader};
@@ -16,7 +16,7 @@ pub(super) struct Line {
     pub(super) estimate: EstimatedImage,
 }
 
-/// Lines of an earlier run; a last one that was cut short is left out.
+/// Reads the lines of an earlier run; lines that are not valid are left out, such as a truncated last one.
 pub(super) fn read(path: &Path) -> Outcome<Vec<Line>> {
     if !path.is_file() {
         return Ok(Vec::new());

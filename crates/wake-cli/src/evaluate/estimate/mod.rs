@@ -1,4 +1,4 @@
-//! `wake evaluate estimate`: errors and error bars of estimates of ship and wind.
+//! `wake evaluate estimate`: evaluates errors and error bars of ship and wind estimates.
 
 mod lines;
 mod options;
@@ -79,7 +79,7 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
     Ok(())
 }
 
-/// Line of an image; `None` where the set has none at this index.
+/// Estimates an image; `None` if the set has none at this index.
 fn estimated(set: &Set, index: u64) -> Outcome<Option<Line>> {
     let Some(image) = set.image(index)? else {
         return Ok(None);

@@ -8,10 +8,10 @@ use wake_train::evaluation::{AbsoluteErrors, EstimateRow, EstimatedImage};
 use super::lines::Line;
 use super::sets::Set;
 
-/// Guess of every speed, the middle of the paper's range \[m/s\]: the row that nothing may be worse than.
+/// Constant guess of the speed, the middle of the paper's range \[m/s\]: the baseline.
 const MIDDLE: f64 = 9.0;
 
-/// All sets.
+/// Figures of all sets.
 #[derive(Serialize)]
 pub(super) struct Report {
     sets: Vec<Figures>,
@@ -26,17 +26,17 @@ struct Figures {
     identifiable: usize,
     /// Identifiable images whose speed is wrong by more than 10 %, or whose heading by more than 5 degrees.
     wrong: usize,
-    /// Images whose bound tells the speed to a tenth of the paper's range, and identifiable ones among them.
+    /// Images whose bound of the speed is below a tenth of the paper's range, and identifiable ones among them.
     tellable: [usize; 2],
     /// Median of the largest misfit of the residual spectrum, as a factor.
     misfit: f64,
-    /// Median seconds of an estimate, times the threads that it had.
+    /// Median seconds of an estimate, times its threads.
     seconds: f64,
-    /// Errors by value; of real tiles the heading alone has a truth.
+    /// Errors by value; real tiles have a true value of the heading only.
     rows: Vec<EstimateRow>,
-    /// Heading and speed as `measure` reads them on the same images.
+    /// Errors of heading and speed from `measure` on the same images.
     measured: [AbsoluteErrors; 2],
-    /// Heading of the sighting, and the middle of the range of speeds.
+    /// Errors of the sighting's heading, and of the constant guess of the speed.
     guessed: [AbsoluteErrors; 2],
     /// Images and identifiable ones by range of incidence \[deg\] and of speed \[m/s\].
     by_incidence: Vec<Part>,
@@ -52,17 +52,17 @@ struct Part {
     identifiable: usize,
 }
 
-/// Largest bound of the speed that tells it: a tenth of the paper's range of 6 to 12 m/s \[m/s\].
+/// Largest bound of the speed that counts as informative: a tenth of the paper's range of 6 to 12 m/s \[m/s\].
 const TELLING: f64 = 0.6;
 
-/// Identifiable images below which a set has no table of errors.
+/// Fewest identifiable images for which a set has a table of errors.
 const FEWEST: usize = 5;
 
 /// Limits of the ranges.
 const INCIDENCES: [f64; 5] = [0.0, 20.0, 22.0, 28.0, 90.0];
 const SPEEDS: [f64; 5] = [0.0, 6.6, 8.0, 10.0, 30.0];
 
-/// Largest relative error of a right speed, and largest error of a right heading \[deg\].
+/// Largest relative error of a correct speed, and largest error of a correct heading \[deg\].
 const RIGHT: (f64, f64) = (0.1, 5.0);
 
 impl Report {
@@ -107,7 +107,7 @@ impl Report {
         text
     }
 
-    /// Writes which part the errors come from: search, mean image or noise.
+    /// Writes how much search, mean image and noise model contribute to the errors.
     fn parts_of_error(&self, text: &mut String) {
         let parts = [
             ("paper", "nothing"),
@@ -236,7 +236,7 @@ impl Figures {
             .filter(|row| row.median.is_some())
     }
 
-    /// The line of the set.
+    /// Writes the row of the set in the summary table.
     fn summarise(&self, text: &mut String) {
         let of = |quantity, unit| match self.row(quantity).and_then(|row| row.median) {
             Some(median) => format!("{} {unit}", shown(Some(median))),
@@ -256,7 +256,7 @@ impl Figures {
         );
     }
 
-    /// The tables of the set.
+    /// Writes the tables of the set.
     fn write(&self, text: &mut String) {
         let _ = writeln!(text, "\n## {}\n\n{}.", self.set, sentence(self.about));
         let has_table = self.identifiable >= FEWEST && !self.rows.is_empty();
@@ -352,7 +352,7 @@ fn parts(
     limits.windows(2).map(part).collect()
 }
 
-/// A sentence begins with a capital.
+/// Capitalises the first letter.
 fn sentence(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or(String::new(), |first| {
@@ -360,7 +360,7 @@ fn sentence(text: &str) -> String {
     })
 }
 
-/// Three significant digits, or a dash.
+/// Formats three significant digits, or a dash.
 fn shown(value: Option<f64>) -> String {
     value.map_or("–".to_owned(), |value| {
         let digits = (2.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 5.0);

@@ -1,4 +1,4 @@
-//! Images that are estimated, by set.
+//! Sets of images for the evaluation of estimates.
 
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
@@ -18,11 +18,11 @@ use super::super::detector::real;
 use super::options::Options;
 use crate::exit::Outcome;
 
-/// Seed of the scenes of the recipe detector; no training has it.
+/// Seed of the scenes of the recipe detector, which no training has.
 const SEED: u64 = 900_301;
 /// Rows and columns of its images.
 const SIDE: usize = 256;
-/// Assumptions about real tiles, whose radar is not known: pixel \[m\], incidence \[deg\] and looks.
+/// Assumptions about real tiles, whose radar is unknown: pixel \[m\], incidence \[deg\] and looks.
 const ASSUMED: (f64, f64, u32) = (10.0, 35.0, 4);
 
 /// A set of images.
@@ -47,7 +47,7 @@ enum Kind {
 }
 
 impl Set {
-    /// All sets that are asked for.
+    /// All requested sets.
     pub(super) fn all(options: &Options) -> Outcome<Vec<Self>> {
         let device = device_named(&options.device)?;
         let mut recipe = Recipe::detector()?;
@@ -115,7 +115,8 @@ impl Set {
             for (name, about, change) in wrong {
                 add(name, about, others, Kind::Wrong(change));
             }
-            // What is left of the errors without the search, then without the model of the mean, then without that of the noise.
+            // Errors that remain without the search, then also without errors of the mean image, then also without
+            // errors of the noise model.
             add(
                 "from the truth",
                 "paper's scenes, from the true scene instead of a search",
@@ -156,17 +157,17 @@ impl Set {
         Ok(sets)
     }
 
-    /// True for real tiles: their speeds are not known.
+    /// True for real tiles, whose speeds are unknown.
     pub(super) fn is_real(&self) -> bool {
         matches!(self.kind, Kind::Real(_))
     }
 
-    /// True for the sea without ships.
+    /// True for the set of sea without ships.
     pub(super) fn is_empty(&self) -> bool {
         matches!(self.kind, Kind::Empty)
     }
 
-    /// An image of the set; `None` where a scene has not one ship, or the detector finds nothing.
+    /// An image of the set; `None` if a scene does not have exactly one ship, or if the detector finds nothing.
     pub(super) fn image(&self, index: u64) -> Outcome<Option<ToEstimate>> {
         let truth = match &self.kind {
             Kind::Detector(recipe) => recipe.scene(index)?,
@@ -225,7 +226,7 @@ impl Set {
     }
 }
 
-/// The estimator's mean image of a scene, times the relative intensity of a simulated sea without its ship.
+/// The estimator's mean image of a scene, times the relative intensity of a simulated sea without the ship.
 fn over_open_sea(truth: &Scene) -> Outcome<Field> {
     let mean = |scene: &Scene| ExpectedImage::new(scene, &[])?.intensity(scene);
     let mut open = truth.clone();
@@ -239,7 +240,8 @@ fn over_open_sea(truth: &Scene) -> Outcome<Field> {
     Ok(image)
 }
 
-/// Input of the estimator: radar, grid, hull and water of a scene, with default wind, without swell, gusts and slicks.
+/// Input of the estimator: radar, grid, hull and water of a scene, with default wind, and without swell, gusts and
+/// slicks.
 fn known(truth: &Scene) -> Scene {
     let mut known = truth.clone();
     let Sea {
@@ -268,7 +270,7 @@ fn known(truth: &Scene) -> Scene {
     known
 }
 
-/// Place and heading of a ship with Gaussian errors.
+/// Position and heading of a ship with Gaussian errors.
 fn sighted(ship: &Ship, truth: &Scene, index: u64) -> Sighting {
     let right = Sighting::of_ship(truth);
     mistaken(
@@ -277,11 +279,11 @@ fn sighted(ship: &Ship, truth: &Scene, index: u64) -> Sighting {
     )
 }
 
-/// A sighting with Gaussian errors of its own deviations, cut at two of them.
+/// Adds Gaussian errors to a sighting with its own standard deviations, clipped at two of them.
 fn mistaken(right: Sighting, index: u64) -> Sighting {
     let mut random = StdRng::seed_from_u64(SEED ^ (index << 20));
     let mut gaussian = || {
-        // Twelve uniform numbers have the variance 1.
+        // The sum of twelve uniform numbers has variance 1.
         let sum: f64 = (0..12).map(|_| random.random_range(0.0..1.0)).sum();
         (sum - 6.0).clamp(-2.0, 2.0)
     };
@@ -292,7 +294,7 @@ fn mistaken(right: Sighting, index: u64) -> Sighting {
     }
 }
 
-/// The likeliest wake that the detector finds.
+/// The detection with the highest score.
 fn detected(detector: &Detector, image: &Field, scene: &Scene) -> Outcome<Option<Sighting>> {
     let grey = GreyScale::filling(image);
     let levels = image.values.iter().map(|&v| grey.level(f64::from(v)));
@@ -302,7 +304,7 @@ fn detected(detector: &Detector, image: &Field, scene: &Scene) -> Outcome<Option
     Ok(best.map(|one| of_wake(&one.wake, scene)))
 }
 
-/// Place and heading of a wake's ship in a scene of its image.
+/// Position and heading of the ship of a wake, in the scene of its image.
 fn of_wake(wake: &Wake, scene: &Scene) -> Sighting {
     let grid = &scene.grid;
     let [column, row] = wake.tip.map(f64::from);

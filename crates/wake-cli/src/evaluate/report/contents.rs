@@ -5,31 +5,31 @@ use crate::evaluate::timing::TimingRow;
 use serde::Serialize;
 use wake_train::evaluation::Figures;
 
-/// Everything that `report.json` holds.
+/// Contents of `report.json`.
 #[derive(Debug, Serialize)]
 pub(crate) struct Report {
     #[serde(flatten)]
     pub(crate) figures: Figures,
-    /// Pixels along a side of the images, and their size [m].
+    /// Pixels along a side of the images, and pixel spacing [m].
     pub(crate) pixels_along: usize,
     pub(crate) spacing: f64,
     /// Whether images are compared with speckle.
     pub(crate) speckle: bool,
-    /// Ways of drawing with a text-to-image model.
+    /// Schedulers and steps of a text-to-image model.
     pub(crate) schedulers: Vec<SchedulerRow>,
     pub(crate) seconds: Vec<TimingRow>,
     pub(crate) paper: Paper,
 }
 
-/// Figures that the paper states for its model.
+/// Figures that the paper reports for its model.
 #[derive(Debug, Serialize)]
 pub(crate) struct Paper {
     pub(crate) ssim: f64,
     pub(crate) psnr_db: f64,
     pub(crate) lpips: f64,
-    /// Seconds of an image of 256 × 256 pixels on an RTX 3090.
+    /// Seconds per image of 256 × 256 pixels on an RTX 3090.
     pub(crate) seconds_256: f64,
-    /// Times faster than its simulator, at most.
+    /// Largest speed-up over its simulator.
     pub(crate) speed_up: f64,
 }
 
@@ -41,7 +41,7 @@ pub(crate) const PAPER: Paper = Paper {
     speed_up: 11.0,
 };
 
-/// A number, or a dash.
+/// Formats a number, or a dash if there is none.
 pub(super) fn number(value: Option<f64>, digits: usize) -> String {
     value.map_or("–".to_owned(), |v| format!("{v:.digits$}"))
 }

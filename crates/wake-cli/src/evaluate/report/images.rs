@@ -1,8 +1,8 @@
-//! Figures of images: ablation, pixels, wake correlation.
+//! Tables of image figures: ablation, pixels, wake correlation, schedulers.
 
 use super::contents::{Report, number};
 
-/// Model over simulator.
+/// Ratio of model to simulator.
 fn ratio(model: Option<f64>, simulator: Option<f64>) -> String {
     number(model.zip(simulator).map(|(m, s)| m / s), 3)
 }

@@ -1,4 +1,4 @@
-//! The report as text.
+//! Report of `wake evaluate` in Markdown.
 
 mod contents;
 mod images;
@@ -65,7 +65,7 @@ fn seconds(report: &Report) -> String {
     text
 }
 
-/// The paper's figures, apart from all others.
+/// The paper's figures, apart from the others.
 fn papers(paper: &Paper) -> String {
     format!(
         "## The paper's own figures\n\n\
@@ -78,7 +78,7 @@ fn papers(paper: &Paper) -> String {
 }
 
 impl Report {
-    /// Writes `report.json` and `report.md`, and says what was written.
+    /// Writes `report.json` and `report.md`, and prints the report.
     pub(crate) fn write(&self, common: &Common) -> Outcome<()> {
         let (out, text) = (&common.out, markdown(self));
         whole_files::write_json(&out.join("report.json"), self)?;

@@ -1,4 +1,4 @@
-//! Figures of values that are read from the images.
+//! Tables of values measured in the images.
 
 use super::contents::{Report, number};
 use wake_train::evaluation::{AbsoluteErrors, MeasurementRow};

@@ -14,7 +14,7 @@ use wake_nn::resnet::{ResnetBlock, ResnetShape};
 /// ε of every normalisation in an autoencoder.
 const EPSILON: f64 = 1e-6;
 
-/// From an image to means and log-variances.
+/// Encoder from an image to means and log-variances.
 #[derive(Module, Debug)]
 pub(super) struct Encoder {
     conv_in: Conv2d,
@@ -24,14 +24,14 @@ pub(super) struct Encoder {
     conv_out: Conv2d,
 }
 
-/// Residual blocks, then half the size.
+/// Residual blocks, then downsampling by two.
 #[derive(Module, Debug)]
 struct EncoderBlock {
     resnets: Vec<ResnetBlock>,
     downsamplers: Vec<Downsample>,
 }
 
-/// From a latent image to an image.
+/// Decoder from a latent image to an image.
 #[derive(Module, Debug)]
 pub(super) struct Decoder {
     conv_in: Conv2d,
@@ -41,14 +41,14 @@ pub(super) struct Decoder {
     conv_out: Conv2d,
 }
 
-/// Residual blocks, then twice the size.
+/// Residual blocks, then upsampling by two.
 #[derive(Module, Debug)]
 struct DecoderBlock {
     resnets: Vec<ResnetBlock>,
     upsamplers: Vec<Upsample>,
 }
 
-/// A residual block, attention of every pixel to every other, a residual block.
+/// A residual block, attention of every pixel to every other, and another residual block.
 #[derive(Module, Debug)]
 struct MidBlock {
     resnets: Vec<ResnetBlock>,
@@ -124,7 +124,7 @@ impl Decoder {
         }
     }
 
-    /// The precision of the weights.
+    /// Floating-point type of the weights.
     pub(super) fn dtype(&self) -> DType {
         self.conv_in.weight.val().dtype()
     }
@@ -198,7 +198,7 @@ fn norm(config: &AutoencoderKlConfig, channels: usize, device: &Device) -> Group
     GroupNorm::new(config.norm_groups, channels, EPSILON, device)
 }
 
-/// `count` residual blocks, of which the first changes the width.
+/// Makes `count` residual blocks, of which the first changes the width.
 fn resnets(
     config: &AutoencoderKlConfig,
     channels_in: usize,

@@ -1,4 +1,4 @@
-//! What shapes an autoencoder, and how it is written in a `config.json`.
+//! Configuration of an autoencoder, and its `config.json`.
 
 use std::path::Path;
 
@@ -8,21 +8,20 @@ use serde_json::{Value, json};
 use crate::options::Options;
 use wake_nn::{Error, Result, check_range};
 
-/// Widths and options of an [`AutoencoderKl`](super::AutoencoderKl); the defaults are those of
-/// Stable Diffusion v1.4.
+/// Widths and options of an [`AutoencoderKl`](super::AutoencoderKl), by default those of Stable Diffusion v1.4.
 #[derive(Config, Debug, PartialEq)]
 pub struct AutoencoderKlConfig {
-    /// Channels of the image that is encoded.
+    /// Channels of the input image.
     #[config(default = 3)]
     pub in_channels: usize,
-    /// Channels of the image that is decoded.
+    /// Channels of the output image.
     #[config(default = 3)]
     pub out_channels: usize,
-    /// Side of the squares of pixels that become channels before the first convolution and pixels
-    /// again after the last; 1 in Stable Diffusion.
+    /// Side of the squares of pixels that become channels before the first convolution, and become
+    /// pixels again after the last; 1 in Stable Diffusion.
     #[config(default = 1)]
     pub patch_size: usize,
-    /// Width of each level, from the full size downwards; each but the last halves the image.
+    /// Width of each level, from full size down; each level but the last halves the image.
     #[config(default = "vec![128, 256, 512, 512]")]
     pub block_out_channels: Vec<usize>,
     /// Residual blocks per level of the encoder; the decoder has one more.
@@ -34,7 +33,7 @@ pub struct AutoencoderKlConfig {
     /// Groups of every group normalisation.
     #[config(default = 32)]
     pub norm_groups: usize,
-    /// Whether the middle blocks attend.
+    /// Whether the middle blocks have attention.
     #[config(default = true)]
     pub mid_attention: bool,
     /// Whether a 1 × 1 convolution follows the encoder.
@@ -58,8 +57,9 @@ pub struct AutoencoderKlConfig {
 const COMPONENT: &str = "AutoencoderKL";
 
 impl AutoencoderKlConfig {
-    /// The small model for grey images: squares of 4 × 4 pixels become channels, so that no thin
-    /// convolution runs at full size.
+    /// Configuration of the small model for grey images.
+    ///
+    /// Squares of 4 × 4 pixels become channels, so that no convolution with few channels runs at full size.
     ///
     /// - `latent_channels`: 4…16
     /// - `levels`: 2 or 3, for a latent image 8 or 16 times smaller
@@ -91,13 +91,13 @@ impl AutoencoderKlConfig {
     ///
     /// # Errors
     ///
-    /// [`Error::Unsupported`] for an option that would change the numbers and that we lack, and what
-    /// [`validate`](Self::validate) finds; [`Error::Io`], [`Error::Json`] for a bad file.
+    /// [`Error::Unsupported`] for an option that would change the result and is not implemented, and the errors of
+    /// [`validate`](Self::validate); [`Error::Io`], [`Error::Json`] for a bad file.
     pub fn read(path: &Path) -> Result<Self> {
         Self::from_json(&whole_files::read_text(path)?, path)
     }
 
-    /// Reads the text of a `config.json`; `path` only serves messages.
+    /// Reads the text of a `config.json`; `path` is used only in messages.
     ///
     /// # Errors
     ///
@@ -106,7 +106,7 @@ impl AutoencoderKlConfig {
         let mut options = Options::parse(COMPONENT, text, path)?;
         options.only("_class_name", &[COMPONENT])?;
         options.only("act_fn", &["silu", "swish"])?;
-        // Only says in which precision diffusers should run.
+        // Only sets the precision in which diffusers should run.
         options.ignore(&["force_upcast"]);
         let config = Self::take(&mut options)?;
         options.finish()?;
@@ -145,7 +145,7 @@ impl AutoencoderKlConfig {
         })
     }
 
-    /// The `config.json` that diffusers reads as this model.
+    /// `config.json` from which diffusers reads this model.
     ///
     /// With a `patch_size` above 1 diffusers reads the network between the rearrangements of pixels
     /// (torch's `PixelUnshuffle` and `PixelShuffle`).
@@ -218,7 +218,7 @@ impl AutoencoderKlConfig {
     }
 }
 
-/// Channels of the image, from those that the first or last convolution sees.
+/// Channels of the image, from those of the first or last convolution.
 fn unpatched(name: &str, channels: usize, patch_size: usize) -> Result<usize> {
     check_range("patch_size", patch_size as f64, 1.0, 64.0)?;
     let patch = patch_size * patch_size;

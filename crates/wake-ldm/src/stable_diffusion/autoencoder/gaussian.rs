@@ -1,10 +1,10 @@
-//! The normal distribution that an image is encoded to.
+//! Normal distribution to which an image is encoded.
 
 use burn::tensor::Tensor;
 
 /// An independent normal distribution for every element of the latent image.
 ///
-/// The logarithm of the variance is held in [−30, 20], so that no standard deviation overflows.
+/// The logarithm of the variance is clamped to [−30, 20], so that no standard deviation overflows.
 ///
 /// # References
 ///
@@ -41,7 +41,7 @@ impl GaussianPosterior {
         (self.logvar.clone() * 0.5).exp()
     }
 
-    /// A latent image, given standard normal noise of its shape.
+    /// Draws a latent image from standard normal noise of its shape.
     ///
     /// ```text
     /// z = μ + σ n
@@ -64,7 +64,7 @@ impl GaussianPosterior {
         sum_per_image((mean.square() + logvar.clone().exp() - 1.0 - logvar) * 0.5)
     }
 
-    /// Divergence from another such distribution, one number per image.
+    /// Divergence from another distribution of this kind, one number per image.
     ///
     /// ```text
     /// KL = ½ Σ ((μ − μ₂)² / σ₂² + σ² / σ₂² − 1 − ln σ² + ln σ₂²)

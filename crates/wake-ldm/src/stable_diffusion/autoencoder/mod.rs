@@ -1,4 +1,4 @@
-//! The autoencoder: from an image to a latent image a few times smaller, and back.
+//! Autoencoder between images and latent images a few times smaller.
 
 mod blocks;
 mod config;
@@ -30,7 +30,7 @@ pub use tiling::Tiling;
 /// ```
 ///
 /// Images lie in [−1, 1]. `encode` and `decode` work on z; [`to_latents`](Self::to_latents) and
-/// [`from_latents`](Self::from_latents) convert to what the diffusion model sees.
+/// [`from_latents`](Self::from_latents) convert to and from the latents of the diffusion model.
 ///
 /// # References
 ///
@@ -47,7 +47,7 @@ pub struct AutoencoderKl {
 }
 
 impl AutoencoderKlConfig {
-    /// An autoencoder with random weights; they are drawn when they are first used.
+    /// Makes an autoencoder with random weights, which are drawn on first use.
     ///
     /// # Panics
     ///
@@ -76,7 +76,7 @@ impl AutoencoderKl {
     ///
     /// # Errors
     ///
-    /// As [`load`], and what [`AutoencoderKlConfig::read`] finds.
+    /// The errors of [`load`] and of [`AutoencoderKlConfig::read`].
     pub fn from_folder(folder: &Path, device: &Device) -> Result<Self> {
         let config = AutoencoderKlConfig::read(&folder.join("config.json"))?;
         load(config.init(device), Layout::Diffusers, folder)
@@ -87,7 +87,7 @@ impl AutoencoderKl {
         &self.config
     }
 
-    /// Grey 0…1, or colours, as [`encode`](Self::encode) takes them: −1…1, one grey in every channel.
+    /// Scales grey in 0…1, or colours, to −1…1 as [`encode`](Self::encode) needs it, and repeats a single grey channel.
     ///
     /// # Shapes
     ///
@@ -105,13 +105,13 @@ impl AutoencoderKl {
     /// # Shapes
     ///
     /// - `image`: `[batch, in_channels, rows, columns]`; rows and columns should be multiples of
-    ///   [`downsampling`](Self::downsampling), else the last ones are lost
+    ///   [`downsampling`](Self::downsampling), otherwise the last ones are lost
     /// - posterior: `[batch, latent_channels, rows / downsampling, columns / downsampling]`
     pub fn encode(&self, image: Tensor<4>) -> GaussianPosterior {
         GaussianPosterior::from_moments(self.moments(image))
     }
 
-    /// Encodes one tile after the other.
+    /// Encodes one tile at a time.
     ///
     /// # Shapes
     ///
@@ -119,7 +119,7 @@ impl AutoencoderKl {
     ///
     /// # Panics
     ///
-    /// When the tile is no multiple of the downsampling, or the overlap outside 0…0.5.
+    /// When the tile is not a multiple of the downsampling, or the overlap is outside 0…0.5.
     pub fn encode_tiled(&self, image: Tensor<4>, tiling: Tiling) -> GaussianPosterior {
         let [pixels, latents] = tiling.cuts(self.downsampling());
         if fits(&image, pixels.tile) {
@@ -129,7 +129,7 @@ impl AutoencoderKl {
         GaussianPosterior::from_moments(moments)
     }
 
-    /// Means and log-variances as the network gives them, side by side along the channels.
+    /// Means and log-variances from the network, concatenated along the channels.
     ///
     /// # Shapes
     ///
@@ -147,7 +147,7 @@ impl AutoencoderKl {
         cast_to(moments, dtype)
     }
 
-    /// Decodes z to images, about in [−1, 1].
+    /// Decodes z to images approximately in [−1, 1].
     ///
     /// # Shapes
     ///
@@ -166,7 +166,7 @@ impl AutoencoderKl {
         )
     }
 
-    /// Decodes one image of the batch after the other, in the memory of one.
+    /// Decodes the images of a batch one at a time, with the memory of one.
     ///
     /// # Shapes
     ///
@@ -182,7 +182,7 @@ impl AutoencoderKl {
         )
     }
 
-    /// Decodes one tile after the other, in the memory of one.
+    /// Decodes one tile at a time, with the memory of one.
     ///
     /// # Shapes
     ///
@@ -209,7 +209,7 @@ impl AutoencoderKl {
         latents / self.config.scaling_factor + self.config.shift_factor
     }
 
-    /// The same with another shift and scale of latents, as [`to_latents`](Self::to_latents) has them.
+    /// Returns the model with another shift and scale of latents, as used by [`to_latents`](Self::to_latents).
     #[cfg(feature = "autodiff")]
     pub fn with_latents(mut self, shift: f64, scale: f64) -> Self {
         self.config = self

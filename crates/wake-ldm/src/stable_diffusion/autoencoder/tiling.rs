@@ -1,20 +1,20 @@
-//! Large images in overlapping tiles, so that memory grows with the tile instead of the image.
+//! Processing of large images in overlapping tiles, so that memory grows with the tile and not with the image.
 
 use burn::tensor::{Device, Tensor};
 
-/// Tiles of an image.
+/// Size and overlap of the tiles of an image.
 ///
-/// Neighbouring tiles overlap and fade into each other linearly. Normalisation and attention see
-/// one tile at a time, so the result differs a little from that of the whole image.
+/// Neighbouring tiles overlap and are blended linearly. Normalisation and attention act on one tile at
+/// a time, so the result differs slightly from that of the whole image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tiling {
     /// Rows and columns of a tile in pixels; a multiple of the downsampling.
     pub tile: usize,
-    /// Share of a tile that overlaps the next, 0…0.5.
+    /// Fraction of a tile that overlaps the next, 0…0.5.
     pub overlap: f64,
 }
 
-/// One side of the cut: tiles of so many pixels, of which so many overlap the next tile.
+/// Tile size and overlap along an axis, in pixels of the image or of the latent image.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cut {
     pub(super) tile: usize,
@@ -22,8 +22,8 @@ pub(super) struct Cut {
 }
 
 impl Tiling {
-    /// The cut of the image and of the latent image. The overlap is a whole number of latent pixels, so
-    /// that tiles lie on each other in both.
+    /// Returns the cuts of the image and of the latent image. The overlap is a whole number of latent pixels, so
+    /// that the tiles of both coincide.
     pub(super) fn cuts(self, downsampling: usize) -> [Cut; 2] {
         let Self { tile, overlap } = self;
         assert!(
@@ -54,7 +54,7 @@ impl Default for Tiling {
     }
 }
 
-/// Runs `run` on tiles cut as `from`, each of which becomes a tile as `to`, and joins them.
+/// Applies `run` to tiles cut as `from`, each of which becomes a tile of `to`, and joins the results.
 pub(super) fn in_tiles(
     x: Tensor<4>,
     from: Cut,
@@ -89,7 +89,7 @@ pub(super) fn in_tiles(
     Tensor::cat(joined, 2)
 }
 
-/// Lets the end of `before` fade into the start of `after` along an axis.
+/// Blends the end of `before` into the start of `after` along an axis.
 ///
 /// ```text
 /// after[i] ← before[n − e + i] (1 − i/e) + after[i] i/e,   0 ≤ i < e
@@ -159,8 +159,8 @@ mod tests {
             .reshape([1, 1, rows, columns])
     }
 
-    /// Where every tile shows the image itself, fading between equal pixels changes nothing, so
-    /// the joined tiles must be the image, for sizes that do and do not fit the tiles.
+    /// If every tile is the image itself, blending mixes equal pixels, so the joined tiles must be the
+    /// image, for sizes that do and do not fit the tiles.
     #[test]
     fn joined_tiles_of_an_image_are_the_image() {
         for (rows, columns) in [(8, 8), (16, 8), (13, 29), (7, 40), (1, 9)] {
@@ -173,7 +173,7 @@ mod tests {
         }
     }
 
-    /// Whatever the share, tiles and overlaps of image and latent image stand in the same proportion.
+    /// For any overlap, tiles and overlaps of the image and the latent image are in the same proportion.
     #[test]
     fn cuts_are_whole_latent_pixels() {
         for (tile, overlap) in [(512, 0.25), (520, 0.25), (8, 0.5), (72, 0.3), (8, 0.0)] {
@@ -184,7 +184,7 @@ mod tests {
         }
     }
 
-    /// Tiles that all show their own number fade linearly: 0 to 1 over the two overlapping pixels.
+    /// Tiles filled with their own number are blended linearly: from 0 to 1 over the two overlapping pixels.
     #[test]
     fn neighbours_fade_linearly() {
         let calls = std::cell::Cell::new(0.0_f32);

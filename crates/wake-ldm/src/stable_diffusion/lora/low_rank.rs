@@ -1,4 +1,4 @@
-//! A low-rank adaptation as a module that can be trained, and its file in diffusers' format.
+//! Low-rank adaptation as a trainable module, and its file in diffusers' format.
 
 use std::collections::HashMap;
 use std::convert::Infallible;
@@ -21,7 +21,7 @@ use whole_files::write_synced;
 /// W' = W + B A
 /// ```
 ///
-/// A is drawn at random and B starts at 0, so that nothing changes at first.
+/// A is drawn at random and B starts at 0, so the model is unchanged at first.
 ///
 /// # References
 ///
@@ -39,7 +39,7 @@ pub struct LowRank {
 }
 
 impl LowRank {
-    /// Changes of rank `rank` of the attentions of a model.
+    /// Makes changes of rank `rank` for the attention layers of a model.
     ///
     /// # Errors
     ///
@@ -73,7 +73,7 @@ impl LowRank {
         &self.layers
     }
 
-    /// A model with the changes added; gradients flow into the changes.
+    /// Returns a model with the changes added; gradients flow into the changes.
     pub fn merged<M: Module>(&self, model: M) -> M {
         let mut factors = self.down.iter().zip(&self.up);
         let Ok(model) = map(model, self.layout, |weight| {
@@ -88,11 +88,11 @@ impl LowRank {
 
     /// Writes the file that diffusers' `load_lora_weights` and [`merge_lora`](super::merge_lora) read.
     ///
-    /// - `prefix`: which model it is of, `unet` or `text_encoder`
+    /// - `prefix`: the model that is changed, `unet` or `text_encoder`
     ///
     /// # Errors
     ///
-    /// [`Error::Io`](wake_nn::Error::Io) when it cannot be written.
+    /// [`Error::Io`](wake_nn::Error::Io) when the file cannot be written.
     pub fn save(&self, prefix: &str, path: &Path) -> Result<()> {
         let factors = (self.layers.iter().enumerate()).flat_map(|(i, layer)| {
             let both = [("lora_A", &self.down[i]), ("lora_B", &self.up[i])];
@@ -122,7 +122,7 @@ impl LowRank {
     }
 }
 
-/// The layer that a weight belongs to, if it is one that is changed.
+/// Name of the layer that a weight belongs to, if the layer is one of those changed.
 fn attention_layer(weight: &Weight) -> Option<&str> {
     const ENDS: [&str; 4] = [".to_q", ".to_k", ".to_v", ".to_out.0"];
     let layer = weight.name.strip_suffix(".weight");
@@ -169,12 +169,12 @@ mod tests {
         let read = merge_lora(block.clone(), Layout::Diffusers, "unet", &path, 1.0).unwrap();
         let merged = run(&change.merged(block.clone()));
         assert!(distance(run(&block), merged.clone()) > 1e-3);
-        // The same sums in the same precision, in another order.
+        // The same sums with the same precision, in another order.
         assert!(distance(run(&read), merged) < 1e-5);
         assert!(LowRank::of_attentions(&block, Layout::Diffusers, 0).is_err());
     }
 
-    /// Factors and weights may be held in other kinds of number; the weights keep theirs.
+    /// Factors and weights may have different number types; the weights keep theirs.
     #[test]
     fn narrow_weights_take_wide_changes() {
         let device = Device::flex();
@@ -200,7 +200,7 @@ mod tests {
         }
     }
 
-    /// Holds weights in 16 bits.
+    /// Converts weights to 16 bits.
     struct Narrow;
 
     impl ModuleMapper for Narrow {
@@ -209,7 +209,7 @@ mod tests {
         }
     }
 
-    /// Every weight and its kind of number.
+    /// All weights with their number types.
     struct All(Vec<(Vec<f32>, DType)>);
 
     impl ModuleVisitor for All {

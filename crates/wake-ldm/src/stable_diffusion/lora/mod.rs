@@ -1,4 +1,4 @@
-//! Low-rank adaptations: merged into the weights, trained, and as files in diffusers' format.
+//! Low-rank adaptations: merging into weights, training, and files in diffusers' format.
 
 mod low_rank;
 mod strength;
@@ -17,7 +17,7 @@ use wake_nn::{Error, Mismatch, Misshapen, Result};
 
 pub use low_rank::LowRank;
 
-/// The two factors of one layer's change.
+/// The two factors of a layer's change.
 #[derive(Debug)]
 struct Factors<'a> {
     down: &'a Stored<'a>,
@@ -29,7 +29,7 @@ impl Factors<'_> {
         self.down.shape().first().copied().unwrap_or(0)
     }
 
-    /// Whether the product has as many rows and columns as the weight.
+    /// Whether the product has the shape of the weight.
     fn fit(&self, shape: &[usize]) -> bool {
         let (down, up) = (self.down.shape(), self.up.shape());
         let count = |shape: &[usize]| shape.iter().product::<usize>();
@@ -45,7 +45,7 @@ impl Factors<'_> {
             && count(&down[1..]) == count(&shape[1..])
     }
 
-    /// The change of the weight, flattened to rows and columns.
+    /// Change of the weight, flattened to rows and columns.
     fn product(&self, rows: usize, device: &Device) -> Result<Tensor<2>> {
         let matrix = |stored: &Stored<'_>, rows: usize| -> Result<Tensor<2>> {
             let numbers = stored.read()?;
@@ -64,13 +64,13 @@ impl Factors<'_> {
 /// ```
 ///
 /// - A, B: `PREFIX.LAYER.lora_A.weight` and `….lora_B.weight` of the file, of rank r
-/// - α: as the file's header says, for all layers or for single ones; where it says nothing, r
-/// - `prefix`: whose layers to take, `unet` or `text_encoder`; the others are left alone
+/// - α: from the file's header, for all layers or for single ones; without an entry, r
+/// - `prefix`: the model whose layers are merged, `unet` or `text_encoder`; other layers are ignored
 ///
 /// # Errors
 ///
-/// As [`load`](wake_nn::weights::load); a layer that the model does not have, or whose factors do not fit it, is a
-/// [`Error::WeightsMismatch`], and so is a file without any layer of this prefix.
+/// As [`load`](wake_nn::weights::load); [`Error::WeightsMismatch`] for a layer that the model does not have or whose
+/// factors do not fit it, and for a file without any layer of this prefix;
 /// [`Error::Unsupported`] for a file trained with an option that changes the sum, such as `use_dora`.
 ///
 /// # References
@@ -106,7 +106,7 @@ pub fn merge_lora<M: Module>(
     })
 }
 
-/// The factors of each weight, by its name in the model, once all are of the model's layers and fit them.
+/// Factors of each weight by its name in the model, after checking that all belong to layers of the model and fit them.
 fn layers<'a>(
     stored: &'a BTreeMap<String, Stored<'a>>,
     shapes: &BTreeMap<String, Vec<usize>>,

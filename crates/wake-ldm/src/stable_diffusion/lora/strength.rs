@@ -1,4 +1,4 @@
-//! How strongly each layer of a low-rank adaptation counts, as its file says.
+//! Strength of each layer of a low-rank adaptation, from the header of its file.
 
 use std::path::Path;
 
@@ -7,10 +7,10 @@ use serde_json::{Map, Value};
 use crate::options::Options;
 use wake_nn::{Error, Result, check_range};
 
-/// Entry of a file's header in which diffusers writes how an adaptation was trained.
+/// Header entry in which diffusers stores how an adaptation was trained.
 pub(super) const NOTE: &str = "lora_adapter_metadata";
 
-/// Options of peft that matter in training only.
+/// Options of peft that matter only in training.
 const TRAINING: [&str; 16] = [
     "arrow_config",
     "base_model_name_or_path",
@@ -30,7 +30,7 @@ const TRAINING: [&str; 16] = [
     "task_type",
 ];
 
-/// The factor α/r of each layer's change, or α/√r where ranks are stabilised.
+/// Factor α/r of each layer's change, or α/√r with rank stabilisation.
 ///
 /// # References
 ///
@@ -40,13 +40,13 @@ const TRAINING: [&str; 16] = [
 pub(super) struct Strength {
     /// α of most layers; `None`: the rank.
     alpha: Option<f64>,
-    /// Ends of layer names with an α of their own.
+    /// Endings of layer names that have an α of their own.
     patterns: Vec<(String, f64)>,
     rank_stabilised: bool,
 }
 
 impl Strength {
-    /// Reads what a file's note says of the layers below `prefix`; without a note, α is the rank.
+    /// Reads the entry for the layers below `prefix` from a file's note; without a note, α is the rank.
     pub(super) fn read(note: Option<&str>, prefix: &str, path: &Path) -> Result<Self> {
         let note: Map<String, Value> =
             serde_json::from_str(note.unwrap_or("{}")).map_err(|source| Error::Json {
@@ -72,7 +72,7 @@ impl Strength {
         Ok(strength)
     }
 
-    /// What the change of a layer of this rank is multiplied with.
+    /// Factor of the change of a layer of this rank.
     pub(super) fn factor(&self, layer: &str, rank: usize) -> f64 {
         let rank = rank as f64;
         let ends = |pattern: &str| {
@@ -90,8 +90,8 @@ impl Strength {
     }
 }
 
-/// Layer names with an α of their own; peft takes them for regular expressions, which only plain
-/// names are here.
+/// Takes the layer names that have an α of their own. peft treats them as regular expressions; only
+/// plain names are accepted here.
 fn take_patterns(options: &mut Options) -> Result<Vec<(String, f64)>> {
     let Some(value) = options.take("alpha_pattern") else {
         return Ok(vec![]);

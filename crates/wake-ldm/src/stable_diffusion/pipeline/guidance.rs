@@ -1,8 +1,8 @@
-//! Making a prediction follow the prompt more than the model would.
+//! Classifier-free guidance, which makes a prediction follow the prompt more closely.
 
 use burn::tensor::Tensor;
 
-/// Strength of the guidance, and how much of its added contrast is taken back.
+/// Guidance scale, and the share of the added contrast that is removed.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Guidance {
     pub(super) scale: f64,
@@ -23,9 +23,9 @@ impl Guidance {
         }
     }
 
-    /// Mixes in the same with the standard deviation that it has without guidance.
+    /// Mixes the prediction with a copy rescaled to the standard deviation of the prediction without guidance.
     fn rescaled(self, guided: Tensor<4>, prompt: Tensor<4>) -> Tensor<4> {
-        // Where nothing varies there is nothing to scale: 0/tiny = 0 and not 0/0.
+        // A constant prediction has nothing to scale: 0/tiny = 0 and not 0/0.
         let ratio = deviation(prompt) / deviation(guided.clone()).clamp_min(f32::MIN_POSITIVE);
         guided * (ratio * self.rescale + (1.0 - self.rescale))
     }
@@ -72,7 +72,7 @@ mod tests {
         }
     }
 
-    /// Rescaled fully, every image has the deviation of its own unguided prediction.
+    /// With full rescaling, every image has the standard deviation of its own unguided prediction.
     #[test]
     fn full_rescaling_restores_the_deviation() {
         let both = batch([3, 4]);

@@ -15,18 +15,18 @@ use crate::unet::UNet;
 use wake_nn::check_range;
 use whole_files::read_text;
 
-/// CLIP's vocabulary: the largest id that its tokenizer gives, and one.
+/// Size of CLIP's vocabulary: its tokenizer's largest id, plus one.
 const CLIP_VOCABULARY: usize = 49408;
 
 impl Pipeline {
-    /// Reads a folder with `text_encoder`, `unet`, `vae`, `scheduler` and (else CLIP's own)
-    /// `tokenizer`, as diffusers writes it, to f32. Its `model_index.json`, where there is one, must name a pipeline of
-    /// these parts.
+    /// Reads a pipeline from a folder in diffusers layout, as f32.
+    ///
+    /// The folder holds `text_encoder`, `unet`, `vae`, `scheduler` and optionally `tokenizer` (by default CLIP's own). If it
+    /// has a `model_index.json`, the index must name a pipeline of these parts.
     ///
     /// # Errors
     ///
-    /// [`Error`] with the file, option or tensors that do not fit, or with two models that do not fit
-    /// each other.
+    /// [`Error`] with the file, option or tensors that do not fit, or with two models that do not fit together.
     pub fn load(folder: &Path, device: &Device) -> Result<Self> {
         check_index(&folder.join("model_index.json"))?;
         let tokenizer = tokenizer(&folder.join("tokenizer"))?;
@@ -77,7 +77,7 @@ impl Pipeline {
 /// Classes of diffusers that have the parts of this pipeline.
 const CLASSES: [&str; 2] = ["StableDiffusionPipeline", "StableDiffusionImg2ImgPipeline"];
 
-/// Refuses a folder whose index is broken, or names another kind of pipeline; none need be there.
+/// Rejects a folder whose index is broken or names another kind of pipeline; the index is optional.
 fn check_index(path: &Path) -> Result<()> {
     if !path.exists() {
         return Ok(());
@@ -99,7 +99,7 @@ fn check_index(path: &Path) -> Result<()> {
     }))
 }
 
-/// The folder's tokenizer, or CLIP's where there is none.
+/// Reads the folder's tokenizer; `None`, which stands for CLIP's, if there is none.
 fn tokenizer(folder: &Path) -> Result<Option<Tokenizer>> {
     if folder.is_dir() {
         Ok(Some(Tokenizer::from_folder(folder)?))
@@ -108,7 +108,7 @@ fn tokenizer(folder: &Path) -> Result<Option<Tokenizer>> {
     }
 }
 
-/// The error for a U-Net that does not fit the other models.
+/// Returns an error for a U-Net that does not fit the other models.
 fn must_agree(option: &str, value: usize, expected: usize) -> Result<()> {
     if value == expected {
         return Ok(());

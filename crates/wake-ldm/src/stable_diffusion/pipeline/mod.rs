@@ -1,4 +1,4 @@
-//! From a sentence to an image: the only file that knows the order of the stages.
+//! From a sentence to an image; this is the only file that determines the order of the stages.
 //!
 //! ```text
 //! prompt ─► token ids ─► embedding ─┐
@@ -32,21 +32,21 @@ use request::invalid;
 pub use request::{Prompts, Request, StartImage};
 pub use sampling::{Progress, Sampling};
 
-/// How many prompts' embeddings are kept.
+/// Number of prompts whose embeddings are cached.
 const CACHED_PROMPTS: usize = 256;
 
 /// The models of a pipeline.
 #[derive(Debug, Clone)]
 pub struct PipelineParts {
-    /// Turns prompts into token ids; `None`: CLIP's own.
+    /// Converts prompts to token ids; `None` stands for CLIP's tokenizer.
     pub tokenizer: Option<Tokenizer>,
-    /// Turns token ids into embeddings.
+    /// Converts token ids to embeddings.
     pub text_encoder: ClipText,
     /// Predicts the noise.
     pub unet: UNet,
-    /// Turns latents into images and back.
+    /// Converts latents to images and back.
     pub autoencoder: AutoencoderKl,
-    /// The scheduler of requests that name none.
+    /// Scheduler of requests that do not name one.
     pub scheduler: SchedulerConfig,
     /// Rows and columns of the latent images of requests that give no size.
     pub latent_size: usize,
@@ -81,11 +81,11 @@ pub struct Pipeline {
 }
 
 impl Pipeline {
-    /// A pipeline of models that lie on `device`.
+    /// Makes a pipeline from models on `device`.
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::WrongNumbers`] for a device that is no CPU and fails
+    /// [`wake_nn::Error::WrongNumbers`] for a device that is not a CPU and fails
     /// [`self_check`](crate::self_check).
     pub fn new(parts: PipelineParts, device: &Device) -> Result<Self> {
         check_once(device)?;
@@ -96,13 +96,14 @@ impl Pipeline {
         })
     }
 
-    /// The models of the pipeline.
+    /// Returns the models of the pipeline.
     pub fn into_parts(self) -> PipelineParts {
         self.parts
     }
 
-    /// Merges a low-rank adaptation in diffusers' format into the U-Net, and into the text encoder where
-    /// the file has layers of it; `scale` is how much of it.
+    /// Merges a low-rank adaptation in diffusers' format into the models.
+    ///
+    /// It is merged into the U-Net, and into the text encoder if the file has layers for it; `scale` is its strength.
     ///
     /// # Errors
     ///
@@ -119,7 +120,7 @@ impl Pipeline {
         Ok(self)
     }
 
-    /// The scheduler of requests that name none.
+    /// Scheduler of requests that do not name one.
     pub fn scheduler(&self) -> &SchedulerConfig {
         &self.parts.scheduler
     }
@@ -134,12 +135,12 @@ impl Pipeline {
         [self.parts.latent_size * self.parts.autoencoder.downsampling(); 2]
     }
 
-    /// The device that the models lie on.
+    /// Device of the models.
     pub fn device(&self) -> &Device {
         &self.device
     }
 
-    /// Embeds prompts, one at a time; those seen before are remembered.
+    /// Embeds prompts one at a time, with a cache of earlier ones.
     ///
     /// # Shapes
     ///
@@ -189,12 +190,12 @@ impl Pipeline {
         (self.parts.autoencoder.decode_sliced(z) / 2.0 + 0.5).clamp(0.0, 1.0)
     }
 
-    /// Encodes images in [0, 1] to latents, drawn with the given noise, one at a time.
+    /// Encodes images in [0, 1] to latents, sampled with the given noise, one image at a time.
     ///
     /// # Shapes
     ///
-    /// `pixels`: `[images, channels, rows, columns]`; `noise` and result: as
-    /// [`decode`](Self::decode) takes them.
+    /// `pixels`: `[images, channels, rows, columns]`; `noise` and result: shaped like the latents of
+    /// [`decode`](Self::decode).
     pub fn encode(&self, pixels: Tensor<4>, noise: Tensor<4>) -> Tensor<4> {
         let images = pixels.dims()[0];
         let one = |k: usize| {
@@ -252,7 +253,7 @@ impl Pipeline {
             .reshape([images, tokens, width]))
     }
 
-    /// Checks the shape of the condition vectors, where there are any.
+    /// Checks the shape of the condition vectors, if there are any.
     fn check_condition(&self, request: &Request) -> Result<()> {
         let Some(condition) = &request.condition else {
             return Ok(());
@@ -270,7 +271,7 @@ impl Pipeline {
         }
     }
 
-    /// Checks that pixels fit latent images of a shape.
+    /// Checks that pixels fit latent images of this shape.
     fn check_pixels(&self, pixels: &Tensor<4>, [_, rows, columns]: [usize; 3]) -> Result<()> {
         let autoencoder = &self.parts.autoencoder;
         let (channels, down) = (autoencoder.image_channels(), autoencoder.downsampling());
@@ -279,7 +280,7 @@ impl Pipeline {
     }
 }
 
-/// Refuses a tensor of another shape.
+/// Rejects a tensor of another shape.
 fn check_shape(what: &str, found: &[usize], expected: &[usize]) -> Result<()> {
     match found == expected {
         true => Ok(()),
@@ -291,7 +292,7 @@ fn check_shape(what: &str, found: &[usize], expected: &[usize]) -> Result<()> {
     }
 }
 
-/// The ids of a prompt, marks and padding included; without a tokenizer those of CLIP's own.
+/// Token ids of a prompt, including marks and padding; without a tokenizer, CLIP's is used.
 pub fn token_ids(tokenizer: Option<&Tokenizer>, prompt: &str) -> Vec<i32> {
     let tokenizer = tokenizer.unwrap_or_else(|| Tokenizer::clip());
     let tokens = tokenizer.encode(prompt);
@@ -303,7 +304,7 @@ fn last_two(x: &Tensor<4>) -> [usize; 2] {
     [rows, columns]
 }
 
-/// Rounds images in [0, 1] to bytes, rows of interleaved channels, one vector per image.
+/// Rounds images in [0, 1] to bytes, as rows of interleaved channels, one vector per image.
 ///
 /// # Shapes
 ///

@@ -1,4 +1,4 @@
-//! What a run is asked for.
+//! Options of a run.
 
 use burn::tensor::Tensor;
 
@@ -7,7 +7,7 @@ use crate::stable_diffusion::scheduler::SchedulerConfig;
 use wake_nn::check_range;
 use wake_nn::noise::NoiseSource;
 
-/// Words, or what the text encoder made of them.
+/// Prompts as texts, or as embeddings from the text encoder.
 #[derive(Debug, Clone)]
 #[allow(
     clippy::large_enum_variant,
@@ -52,7 +52,7 @@ impl From<Tensor<3>> for Prompts {
 pub enum StartImage {
     /// Pixels in [0, 1], `[1 or images, channels, rows, columns]`.
     Pixels(Tensor<4>),
-    /// What the diffusion model sees of an image, `[1 or images, latent_channels, rows, columns]`.
+    /// Latents of the diffusion model, `[1 or images, latent_channels, rows, columns]`.
     Latents(Tensor<4>),
 }
 
@@ -81,7 +81,7 @@ pub struct Request {
     pub(super) images_at_once: usize,
 }
 
-/// Where the noise of each image comes from.
+/// Seeds of the noise of the images.
 #[derive(Debug, Clone)]
 pub(super) enum Seeds {
     /// Image k has this seed plus k.
@@ -91,7 +91,7 @@ pub(super) enum Seeds {
 }
 
 impl Request {
-    /// Prompts with the usual settings: guidance 7.5, 50 steps, one image each, seeds 0, 1, ….
+    /// Makes a request with default settings: guidance 7.5, 50 steps, one image per prompt, seeds 0, 1, ….
     pub fn new(prompts: impl Into<Prompts>) -> Self {
         Self {
             prompts: prompts.into(),
@@ -111,20 +111,19 @@ impl Request {
         }
     }
 
-    /// Negative prompts: one for all prompts, or one each. Default: the empty text.
+    /// Sets the negative prompts: one for all prompts, or one for each. Default: the empty text.
     pub fn with_negative(mut self, negative: impl Into<Prompts>) -> Self {
         self.negative = negative.into();
         self
     }
 
-    /// Guidance scale, g in
+    /// Sets the guidance scale, g in
     ///
     /// ```text
     /// ε = ε(negative) + g (ε(prompt) − ε(negative))
     /// ```
     ///
-    /// in [0, 1000]. At 1 and below there is no guidance, as in diffusers: only the prompt's half
-    /// runs.
+    /// in [0, 1000]. At 1 and below there is no guidance, as in diffusers: only the prompt's half is computed.
     ///
     /// # References
     ///
@@ -134,7 +133,7 @@ impl Request {
         self
     }
 
-    /// Guidance rescale: share by which the contrast of the prediction is reset to that without guidance, in [0, 1].
+    /// Sets the guidance rescale in [0, 1]: the share by which the contrast of the prediction is reset to that without guidance.
     ///
     /// # References
     ///
@@ -145,44 +144,44 @@ impl Request {
         self
     }
 
-    /// Steps of the scheduler.
+    /// Sets the number of steps of the scheduler.
     pub fn with_steps(mut self, steps: usize) -> Self {
         self.steps = steps;
         self
     }
 
-    /// Another scheduler than the pipeline's.
+    /// Uses another scheduler than the pipeline's.
     pub fn with_scheduler(mut self, scheduler: SchedulerConfig) -> Self {
         self.scheduler = Some(scheduler);
         self
     }
 
-    /// Rows and columns of the images, multiples of the autoencoder's downsampling. Default: what
-    /// the U-Net was trained for.
+    /// Sets the rows and columns of the images, multiples of the autoencoder's downsampling. Default: the
+    /// size that the U-Net was trained for.
     pub fn with_size(mut self, rows: usize, columns: usize) -> Self {
         self.size = Some([rows, columns]);
         self
     }
 
-    /// Images per prompt. All images of the first prompt come first.
+    /// Sets the number of images per prompt. All images of the first prompt come first.
     pub fn with_count(mut self, count: usize) -> Self {
         self.count = count;
         self
     }
 
-    /// Image k gets this seed plus k.
+    /// Gives image k this seed plus k.
     pub fn with_seed(mut self, seed: u64) -> Self {
         self.seeds = Seeds::From(seed);
         self
     }
 
-    /// One seed per image.
+    /// Gives every image a seed of its own.
     pub fn with_seeds(mut self, seeds: Vec<u64>) -> Self {
         self.seeds = Seeds::Each(seeds);
         self
     }
 
-    /// Starts from an image, of which `strength` in (0, 1] is replaced: that share of the steps is
+    /// Starts from an image, of which `strength` in (0, 1] is replaced: only that share of the steps is
     /// taken.
     ///
     /// # References
@@ -194,29 +193,27 @@ impl Request {
         self
     }
 
-    /// The standard normal noise to start from, `[images, latent_channels, rows, columns]`, in
-    /// place of the seeds'.
+    /// Starts from this standard normal noise, `[images, latent_channels, rows, columns]`, instead of noise from the seeds.
     pub fn with_latents(mut self, latents: Tensor<4>) -> Self {
         self.latents = Some(latents);
         self
     }
 
-    /// The noise that step i draws, `[steps, images, latent_channels, rows, columns]`, in place of
-    /// the seeds'.
+    /// Uses this noise for step i, `[steps, images, latent_channels, rows, columns]`, instead of noise from the seeds.
     pub fn with_step_noise(mut self, noise: Tensor<5>) -> Self {
         self.step_noise = Some(noise);
         self
     }
 
-    /// Numbers that condition the U-Net beside the prompt, `[images, condition_channels]`. Both
-    /// halves of a guided run get them: guidance acts on the words.
+    /// Conditions the U-Net on numbers in addition to the prompt, `[images, condition_channels]`. Both
+    /// halves of a guided run get them, so guidance acts on the words only.
     pub fn with_condition(mut self, condition: Tensor<2>) -> Self {
         self.condition = Some(condition);
         self
     }
 
-    /// Number of images per pass of the U-Net. With 1, the default, an image does not depend
-    /// on those beside it to the last bit; GPUs want more.
+    /// Sets the number of images per pass of the U-Net. With 1, the default, an image does not depend on the
+    /// others to the last bit; GPUs need more.
     pub fn with_images_at_once(mut self, images: usize) -> Self {
         self.images_at_once = images;
         self
@@ -227,7 +224,7 @@ impl Request {
         self.prompts.len() * self.count
     }
 
-    /// Whether the negative prompt's half runs.
+    /// Whether the negative prompt's half is computed.
     pub(super) fn guided(&self) -> bool {
         self.guidance > 1.0
     }
@@ -256,7 +253,7 @@ impl Request {
         }
     }
 
-    /// Where the noise of each image comes from.
+    /// Noise source of each image.
     pub(super) fn sources(&self) -> Vec<NoiseSource> {
         (0..self.images())
             .map(|k| match &self.seeds {
@@ -267,7 +264,7 @@ impl Request {
     }
 }
 
-/// The error for a number that does not go with the others.
+/// Returns the error for an option that conflicts with others.
 pub(super) fn invalid(
     option: &str,
     value: impl std::fmt::Display,

@@ -1,4 +1,4 @@
-//! The loop over the steps, as an iterator.
+//! Loop over the steps, as an iterator.
 
 use burn::tensor::Tensor;
 
@@ -12,24 +12,24 @@ use crate::unet::UNetInput;
 use wake_nn::check_finite;
 use wake_nn::noise::{NoiseSource, normal_batch};
 
-/// Progress of a run with its present latents.
+/// Progress of a run, with its current latents.
 #[derive(Debug)]
 pub struct Progress {
-    /// Calls of the model made.
+    /// Number of model calls made.
     pub done: usize,
-    /// Calls of the model in all.
+    /// Total number of model calls.
     pub of: usize,
-    /// The training step that the model was asked at.
+    /// Training step of this model call.
     pub timestep: f64,
     /// The noisy latent images after this step.
     pub latents: Tensor<4>,
-    /// The clean latent images as the model sees them now: decode them for a preview.
+    /// The model's current estimate of the clean latent images: decode it for a preview.
     pub denoised: Tensor<4>,
 }
 
 /// A run of the sampler, one step per item.
 ///
-/// Stop asking for items to stop or cancel the run; [`latents`](Self::latents) has what was reached.
+/// Stop iterating to pause or cancel the run; [`latents`](Self::latents) returns the current state.
 #[derive(Debug)]
 pub struct Sampling<'a> {
     pipeline: &'a Pipeline,
@@ -37,7 +37,7 @@ pub struct Sampling<'a> {
     guidance: Option<Guidance>,
     /// `[images, tokens, width]`.
     prompts: Tensor<3>,
-    /// The same of the negative prompts; there only with guidance.
+    /// Embeddings of the negative prompts, only with guidance.
     negatives: Option<Tensor<3>>,
     condition: Option<Tensor<2>>,
     sources: Vec<NoiseSource>,
@@ -49,18 +49,17 @@ pub struct Sampling<'a> {
 }
 
 impl Pipeline {
-    /// Starts a run; nothing but the text encoder (and the encoder of a start image) works yet.
+    /// Starts a run, which so far only runs the text encoder (and the encoder of a start image).
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::OutOfRange`] or
-    /// [`wake_nn::Error::InvalidOption`] for a request that makes no sense, or
-    /// not to these models, and what [`SchedulerConfig::scheduler`](crate::scheduler::SchedulerConfig::scheduler) reports.
+    /// [`wake_nn::Error::OutOfRange`] or [`wake_nn::Error::InvalidOption`] for a request that is invalid or does not
+    /// fit these models, and the errors of [`SchedulerConfig::scheduler`](crate::scheduler::SchedulerConfig::scheduler).
     pub fn sample(&self, request: &Request) -> Result<Sampling<'_>> {
         Sampling::new(self, request)
     }
 
-    /// A whole run: images in [0, 1], `[images, channels, rows, columns]`.
+    /// Samples images in [0, 1] in a whole run, `[images, channels, rows, columns]`.
     ///
     /// # Errors
     ///
@@ -116,18 +115,18 @@ impl<'a> Sampling<'a> {
         })
     }
 
-    /// The latent images as they are now.
+    /// Current latent images.
     pub fn latents(&self) -> Tensor<4> {
         self.latents.clone()
     }
 
-    /// Takes all remaining steps.
+    /// Takes all remaining steps and returns the latents.
     pub fn finish(mut self) -> Tensor<4> {
         while self.next().is_some() {}
         self.latents
     }
 
-    /// One prediction per image; a few images at a time.
+    /// One prediction per image, computed for a few images at a time.
     fn predict(&self, index: usize) -> Tensor<4> {
         let input = self
             .scheduler
@@ -140,7 +139,7 @@ impl<'a> Sampling<'a> {
         Tensor::cat(chunks.collect(), 0)
     }
 
-    /// Predictions of some images, the negative prompt's half beside the prompt's.
+    /// Predictions of some images; with guidance, both halves are computed in one batch.
     fn predict_some(&self, input: Tensor<4>, index: usize, start: usize) -> Tensor<4> {
         let images = input.dims()[0];
         let prompts = self.prompts.clone().narrow(0, start, images);
@@ -179,7 +178,7 @@ impl<'a> Sampling<'a> {
         })
     }
 
-    /// The noise of a step, where it draws some.
+    /// Noise of a step, if it needs any.
     fn noise(&self, index: usize) -> Option<Tensor<4>> {
         if !self.scheduler.needs_noise(index) {
             return None;
@@ -233,7 +232,7 @@ impl Iterator for Sampling<'_> {
 
 impl ExactSizeIterator for Sampling<'_> {}
 
-/// The call that a run starts with: past those that its strength leaves out.
+/// First model call of a run, after the calls that its strength skips.
 fn first_call(request: &Request, scheduler: &dyn Scheduler) -> usize {
     let Some((_, strength)) = request.start else {
         return 0;
@@ -261,7 +260,7 @@ fn initial_noise(
     Ok(given.clone())
 }
 
-/// The clean latent images of a start, one per image of the run.
+/// Clean latent images of a start image, one per image of the run.
 fn start_latents(
     pipeline: &Pipeline,
     image: &StartImage,

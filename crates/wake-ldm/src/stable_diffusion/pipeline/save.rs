@@ -15,7 +15,7 @@ impl Pipeline {
     /// Writes a folder that [`load`](Self::load) and diffusers' `StableDiffusionPipeline` read:
     /// `tokenizer`, `text_encoder`, `unet`, `vae` and `scheduler`, and `model_index.json` last.
     ///
-    /// An autoencoder with a `patch_size` above 1 is one that diffusers does not know as a whole; see
+    /// diffusers cannot read an autoencoder with a `patch_size` above 1 as a whole; see
     /// [`AutoencoderKlConfig::to_json`](crate::stable_diffusion::autoencoder::AutoencoderKlConfig::to_json).
     ///
     /// # Errors
@@ -59,7 +59,7 @@ impl Pipeline {
         write_json(&folder.join("model_index.json"), &self.model_index())
     }
 
-    /// What diffusers reads first: the library and class of each part.
+    /// Index that diffusers reads first: the library and class of each part.
     fn model_index(&self) -> Value {
         json!({
             "_class_name": "StableDiffusionPipeline",

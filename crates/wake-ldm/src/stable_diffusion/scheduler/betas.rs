@@ -1,22 +1,22 @@
-//! Curves of the noise that training steps add, and what schedulers assume about them.
+//! Noise added per training step, and the schedulers' default assumptions about it.
 
 use serde_json::Value;
 
 use crate::options::{Options, list};
 use wake_nn::{Result, check_range};
 
-/// The shape of the noise added per training step, βₜ.
+/// Shape of the noise added per training step, βₜ.
 #[derive(Debug, Clone, PartialEq)]
 pub enum BetaCurve {
-    /// Evenly spaced from the first number to the second.
+    /// Evenly spaced between two numbers.
     Linear(f64, f64),
-    /// Squares of evenly spaced square roots: Stable Diffusion's.
+    /// Squares of evenly spaced square roots, as in Stable Diffusion.
     ScaledLinear(f64, f64),
-    /// From a signal that falls as the square of a cosine, at most 0.999.
+    /// From a signal that falls as a squared cosine, at most 0.999.
     SquaredCosine,
     /// From a signal that falls as exp(−12 t), at most 0.999.
     Exponential,
-    /// A logistic curve from the first number to the second.
+    /// A logistic curve between two numbers.
     Sigmoid(f64, f64),
     /// Numbers given one by one.
     Trained(Vec<f64>),
@@ -65,35 +65,35 @@ impl BetaCurve {
     }
 }
 
-/// Treatment of the signal that remains at the last training step.
+/// Treatment of the signal remaining at the last training step.
 ///
 /// # References
 ///
 /// Lin et al. (2024), "Common Diffusion Noise Schedules and Sample Steps are Flawed", algorithm 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TerminalSnr {
-    /// It stays.
+    /// The signal is kept.
     Kept,
-    /// The schedule is stretched until none is left.
+    /// The schedule is stretched until no signal remains.
     Zero,
     /// As `Zero`, with 2⁻²⁴ kept in the last step, so that σ stays finite.
     AlmostZero,
 }
 
-/// What a scheduler assumes about the schedule where its configuration is silent.
+/// Schedule that a scheduler assumes for missing options.
 #[derive(Debug)]
 pub(super) struct ScheduleDefaults {
-    /// Name of the curve.
+    /// Name of the default curve.
     pub(super) curve: &'static str,
     /// First and last β.
     pub(super) ends: (f64, f64),
-    /// The curve that only this scheduler knows.
+    /// Curve that only this scheduler supports.
     pub(super) further: Option<&'static str>,
-    /// What rescaling to zero terminal signal means to it; `None`: it does not know it.
+    /// Effect of rescaling to zero terminal SNR; `None` if the scheduler does not support it.
     pub(super) rescaled: Option<TerminalSnr>,
 }
 
-/// The defaults that most schedulers share.
+/// Defaults of most schedulers.
 pub(super) const DEFAULTS: ScheduleDefaults = ScheduleDefaults {
     curve: "linear",
     ends: (1e-4, 0.02),
@@ -115,7 +115,7 @@ fn linspace(first: f64, last: f64, steps: usize) -> Vec<f32> {
     (0..steps).map(value).collect()
 }
 
-/// The β that make the signal fall as a function of t in [0, 1], at most 0.999.
+/// β for which the signal falls as a function of t in [0, 1], at most 0.999.
 fn betas_of(signal: impl Fn(f64) -> f64, steps: usize) -> Vec<f32> {
     let at = |i: usize| signal(i as f64 / steps as f64);
     (0..steps)
@@ -157,8 +157,8 @@ mod tests {
     use super::*;
     use crate::stable_diffusion::scheduler::NoiseSchedule;
 
-    /// The closed form of the cosine curve at both ends and in the middle: the famous integer
-    /// division makes all but the last of these zero.
+    /// The closed form of the cosine curve at both ends and in the middle: with the well-known bug of integer
+    /// division, all betas but the last are zero.
     #[test]
     fn cosine_betas_match_their_closed_form() {
         let schedule =

@@ -22,7 +22,7 @@ use super::{Method, NoiseSchedule, Scheduler, SchedulerOption};
 use crate::options::Options;
 use wake_nn::{Error, Result};
 
-/// A method by its short name and its class name in diffusers, and how its options are read.
+/// Method with its short name, its class name in diffusers and the function that reads its options.
 struct Class {
     short: &'static str,
     name: &'static str,
@@ -53,7 +53,7 @@ static CLASSES: [Class; 11] = [
     Class::of::<FlowMatchEulerConfig>("flow-match-euler", "FlowMatchEulerDiscreteScheduler"),
 ];
 
-/// A scheduler and its options, in diffusers' words.
+/// A scheduler and its options, named as in diffusers.
 ///
 /// ```
 /// use wake_ldm::scheduler::{SchedulerConfig, SchedulerOption};
@@ -73,18 +73,18 @@ pub struct SchedulerConfig {
 }
 
 impl SchedulerConfig {
-    /// The short names that [`with_class`](Self::with_class) takes.
+    /// Short names that [`with_class`](Self::with_class) accepts.
     pub fn names() -> impl Iterator<Item = &'static str> {
         CLASSES.iter().map(|class| class.short)
     }
 
-    /// A scheduler with Stable Diffusion v1.4's noise schedule, and its own defaults otherwise but
-    /// for clipping, which is off.
+    /// Makes a scheduler with the noise schedule of Stable Diffusion v1.4.
+    ///
+    /// Its other options have their defaults, except that clipping is off.
     ///
     /// # Errors
     ///
-    /// [`Error::Unsupported`] for a name that is none of [`names`](Self::names) and no class of
-    /// diffusers that is implemented.
+    /// [`Error::Unsupported`] for a name that is neither one of [`names`](Self::names) nor an implemented class of diffusers.
     pub fn stable_diffusion(name: &str) -> Result<Self> {
         let options = [
             ("_class_name", Value::from(class_of(name)?.name)),
@@ -113,7 +113,7 @@ impl SchedulerConfig {
         Self::from_json(&whole_files::read_text(path)?, path)
     }
 
-    /// Reads the text of a `scheduler_config.json`; `path` only serves messages.
+    /// Reads the text of a `scheduler_config.json`; `path` is used only in messages.
     ///
     /// # Errors
     ///
@@ -126,12 +126,12 @@ impl SchedulerConfig {
         Self::from_options(options)
     }
 
-    /// The same with one option changed.
+    /// Returns the configuration with one option changed.
     ///
     /// # Errors
     ///
-    /// [`Error::Unsupported`] for an option or value that would change the numbers and is not
-    /// implemented, [`Error::OutOfRange`] or [`Error::InvalidOption`] for one that makes no sense.
+    /// [`Error::Unsupported`] for an option or value that would change the result and is not
+    /// implemented, [`Error::OutOfRange`] or [`Error::InvalidOption`] for an invalid one.
     pub fn with(self, option: SchedulerOption) -> Result<Self> {
         let (key, value) = option.entry();
         self.with_entry(key, value)
@@ -142,7 +142,7 @@ impl SchedulerConfig {
         Self::from_options(self.options)
     }
 
-    /// Another scheduler with the same options, as diffusers' `from_config` does.
+    /// Returns another scheduler with the same options, as diffusers' `from_config` does.
     ///
     /// # Errors
     ///
@@ -152,26 +152,26 @@ impl SchedulerConfig {
         self.with_entry("_class_name", class.into())
     }
 
-    /// The class name in diffusers.
+    /// Class name in diffusers.
     pub fn class(&self) -> &'static str {
         self.class
     }
 
-    /// The content of a `scheduler_config.json` that says the same.
+    /// Content of the `scheduler_config.json` of this configuration.
     pub fn to_json(&self) -> Value {
         Value::Object(self.options.clone())
     }
 
-    /// The noise of the training steps; `None` for straight paths, which have none.
+    /// Noise of the training steps; `None` for straight paths, which have none.
     pub fn noise_schedule(&self) -> Option<&NoiseSchedule> {
         self.method.schedule()
     }
 
-    /// A scheduler for one run of a number of steps.
+    /// Makes a scheduler for one run with a number of steps.
     ///
     /// # Errors
     ///
-    /// [`Error::OutOfRange`] for a number of steps that the method cannot take, or that leads to
+    /// [`Error::OutOfRange`] for a number of steps that the method does not support, or that leads to
     /// training steps that do not exist; [`Error::InvalidOption`] for noise prediction where no
     /// signal is left.
     pub fn scheduler(&self, steps: usize) -> Result<Box<dyn Scheduler>> {
@@ -197,7 +197,7 @@ impl SchedulerConfig {
     }
 }
 
-/// The class of a short name or of its name in diffusers.
+/// Class with a short name or a class name in diffusers.
 fn class_of(name: &str) -> Result<&'static Class> {
     let found = CLASSES
         .iter()
@@ -213,7 +213,7 @@ fn class_of(name: &str) -> Result<&'static Class> {
     })
 }
 
-/// Python writes infinities that JSON does not know: the largest numbers stand for them.
+/// Replaces the infinities that Python writes, and JSON does not have, by the largest finite numbers.
 fn finite(text: &str) -> String {
     text.replace("-Infinity", "-1.7976931348623157e308")
         .replace(": Infinity", ": 1.7976931348623157e308")

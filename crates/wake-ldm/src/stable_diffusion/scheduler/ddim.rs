@@ -1,4 +1,4 @@
-//! Denoising diffusion implicit models: deterministic, or with as much noise as is asked for.
+//! Denoising diffusion implicit models: deterministic, or with a chosen amount of noise.
 
 use super::betas::{DEFAULTS, ScheduleDefaults};
 use super::prediction::{Clipping, Prediction};
@@ -18,10 +18,10 @@ pub(super) struct DdimConfig {
     steps: Steps,
     prediction: Prediction,
     clipping: Clipping,
-    /// ᾱ after the last step is 1, or else that of the first training step.
+    /// Whether ᾱ is 1 after the last step; otherwise it is that of the first training step.
     end_at_one: bool,
     eta: f64,
-    /// The noise follows from the limited clean image, not from the prediction.
+    /// Whether the noise is computed from the clipped clean image instead of the prediction.
     noise_from_clipped: bool,
 }
 
@@ -59,7 +59,7 @@ impl Method for DdimConfig {
     }
 }
 
-/// The sampler that follows the model's noise back along a straight line in (√ᾱ x₀, √(1−ᾱ) n).
+/// Sampler that follows the predicted noise back along a straight line in (√ᾱ x₀, √(1−ᾱ) n).
 ///
 /// | here | paper |
 /// | --- | --- |
@@ -77,7 +77,7 @@ struct Ddim {
 }
 
 impl Ddim {
-    /// ᾱ at a step and one stride further down.
+    /// ᾱ at a step, and one stride below it.
     fn alphas(&self, index: usize) -> (f64, f64) {
         let DdimConfig {
             schedule,
@@ -92,7 +92,7 @@ impl Ddim {
         )
     }
 
-    /// The standard deviation of the noise that a step adds, Eq. 16.
+    /// Standard deviation of the noise that a step adds, Eq. 16.
     fn deviation(&self, now: f64, next: f64) -> f64 {
         self.config.eta * posterior_variance(now, next).max(0.0).sqrt()
     }
@@ -119,7 +119,7 @@ impl Scheduler for Ddim {
         } = self.config;
         let (now, next) = self.alphas(input.index);
         let level = self.noise_level(input.index);
-        // 1. The clean image, Eq. 9, limited.
+        // 1. The clean image, Eq. 9, clipped.
         let denoised = input.denoised(level, prediction, clipping);
         // 2. The noise.
         let direction = if self.config.noise_from_clipped {

@@ -13,7 +13,7 @@ use super::{
 use crate::options::Options;
 use wake_nn::Result;
 
-/// How much fresh noise a step adds.
+/// Variance of the fresh noise of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Variance {
     /// β̃ₜ = (1 − ᾱₜ₋₁)/(1 − ᾱₜ) βₜ, with √β̃ₜ as the noise's factor.
@@ -70,7 +70,7 @@ impl Method for DdpmConfig {
     }
 }
 
-/// The sampler of the diffusion model's own reverse chain.
+/// Sampler that follows the reverse chain of the diffusion model.
 ///
 /// | here | paper |
 /// | --- | --- |
@@ -89,12 +89,12 @@ struct Ddpm {
 }
 
 impl Ddpm {
-    /// ᾱ at a step and at the one after it (1 after the last).
+    /// ᾱ at a step, and at the next (1 after the last).
     fn alphas(&self, index: usize) -> [f64; 2] {
         [index, index + 1].map(|index| self.path.alpha(index).unwrap_or(1.0))
     }
 
-    /// The standard deviation of the noise that a step adds.
+    /// Standard deviation of the noise that a step adds.
     fn deviation(&self, now: f64, next: f64) -> f64 {
         let variance = match self.variance {
             Variance::Small => posterior_variance(now, next).max(1e-20),
@@ -120,14 +120,14 @@ impl Scheduler for Ddpm {
     fn step(&mut self, input: StepInput) -> StepOutput {
         let [now, next] = self.alphas(input.index);
         let added = 1.0 - now / next;
-        // 1. The clean image, Eq. 15, limited.
+        // 1. The clean image, Eq. 15, clipped.
         let level = self.noise_level(input.index);
         let denoised = input.denoised(level, self.prediction, self.clipping);
-        // 2. The mean of the step back, Eq. 7.
+        // 2. The mean of the reverse step, Eq. 7.
         let of_clean = next.sqrt() * added / (1.0 - now);
         let of_sample = (now / next).sqrt() * (1.0 - next) / (1.0 - now);
         let mean: Tensor<4> = denoised.clone() * of_clean + input.sample * of_sample;
-        // 3. Fresh noise, except on arrival.
+        // 3. Fresh noise, except in the last step.
         let sample = if self.needs_noise(input.index) {
             mean + required(input.noise) * self.deviation(now, next)
         } else {

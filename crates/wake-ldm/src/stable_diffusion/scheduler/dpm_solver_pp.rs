@@ -11,7 +11,7 @@ use super::{Method, NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput,
 use crate::options::Options;
 use wake_nn::Result;
 
-/// Runs shorter than this end at lower order.
+/// Runs shorter than this end with lower order.
 const SHORT_RUN: usize = 15;
 
 /// Options of [`DpmSolver`].
@@ -20,9 +20,9 @@ pub(super) struct DpmSolverConfig {
     schedule: NoiseSchedule,
     path: PathOptions,
     shared: IntegratorOptions,
-    /// With noise added at every step.
+    /// Whether noise is added at every step.
     stochastic: bool,
-    /// The slope of the second order from the midpoint rule, or else from Heun's.
+    /// Whether the second-order slope follows the midpoint rule; otherwise it follows Heun's.
     midpoint: bool,
     euler_at_final: bool,
 }
@@ -47,7 +47,7 @@ impl Method for DpmSolverConfig {
             &["fixed_small", "fixed_small_log", "fixed_large"],
         )?;
         let [data, stochastic] = take_algorithm(options, path.end_at_zero)?;
-        // diffusers' third order with noise does not converge, so there is nothing to agree with.
+        // The third order of diffusers with noise does not converge, so there is no reference to match.
         let most = if stochastic { 2 } else { 3 };
         Ok(Self {
             shared: IntegratorOptions::take(options, path.sigmas.spread, data, most)?,
@@ -72,7 +72,7 @@ impl Method for DpmSolverConfig {
     }
 }
 
-/// The visited steps, of which the noisiest may be cut off at a signal-to-noise ratio.
+/// Reads the visited steps, of which the noisiest may be cut off at a signal-to-noise ratio.
 fn take_steps(options: &mut Options, schedule: &NoiseSchedule) -> Result<Steps> {
     let clip = options.f64("lambda_min_clipped", f64::MIN)?;
     let clipped = schedule
@@ -88,7 +88,7 @@ fn take_steps(options: &mut Options, schedule: &NoiseSchedule) -> Result<Steps> 
     Ok(steps)
 }
 
-/// Whether the equation is solved in terms of the clean image (the "++"), and with noise at every step.
+/// Reads whether the equation is solved in terms of the clean image (the "++"), and whether noise is added.
 fn take_algorithm(options: &mut Options, end_at_zero: bool) -> Result<[bool; 2]> {
     let known = [
         ("dpmsolver++", [true, false]),
@@ -106,7 +106,7 @@ fn take_algorithm(options: &mut Options, end_at_zero: bool) -> Result<[bool; 2]>
 }
 
 fn take_midpoint(options: &mut Options) -> Result<bool> {
-    // The last three are UniPC's names, which diffusers takes for its default here.
+    // The last three are UniPC's names, which diffusers replaces by its default here.
     let midpoint = ["midpoint", "logrho", "bh1", "bh2"].map(|name| (name, true));
     let known = [&[("heun", false)], &midpoint[..]].concat();
     options.choice("solver_type", "midpoint", &known)
@@ -120,7 +120,7 @@ fn take_midpoint(options: &mut Options) -> Result<bool> {
 /// | `h` | hᵢ = λᵢ₊₁ − λᵢ |
 /// | `slope`, `curvature` | D₁, D₂: divided differences of the predictions |
 ///
-/// A level that is visited twice ends the history, which would divide by zero.
+/// A level that is visited twice ends the history, because it would lead to a division by zero.
 ///
 /// # References
 ///
@@ -145,7 +145,7 @@ struct Factors {
 }
 
 impl DpmSolver {
-    /// The order of a step: as much as history, end of the run and repeated levels allow.
+    /// Order of a step: as high as the history, the end of the run and repeated levels allow.
     fn order(&self, index: usize) -> usize {
         let DpmSolverConfig {
             euler_at_final,
@@ -163,8 +163,8 @@ impl DpmSolver {
         self.path.order(index, wanted, self.history.len())
     }
 
-    /// The factors of Eqs. 4.1 and 4.2 (in terms of the clean image) or B.2 to B.4 (of the noise):
-    /// the same functions of z = −h and z = h; of twice that with noise.
+    /// The factors of Eqs. 4.1 and 4.2 (in terms of the clean image) or B.2 to B.4 (of the noise): the same
+    /// functions of z = −h and z = h. With noise added, z is doubled for the clean image, the amplitude for the noise.
     fn factors(&self, index: usize, order: usize) -> Factors {
         let data = self.config.shared.data;
         let exact = self.path.exact_part(index, data);
@@ -183,7 +183,7 @@ impl DpmSolver {
         } else {
             over(value, z) - 1.0
         };
-        // The variance that noise has gathered: 1 − e^{−2h}, or e^{2h} − 1.
+        // Variance of the added noise: 1 − e^{−2h}, or e^{2h} − 1.
         let gathered = spread.exp_m1().abs();
         Factors {
             sample,
@@ -215,7 +215,7 @@ impl DpmSolver {
     }
 }
 
-/// x/z, and 0 for a step of no length.
+/// x/z, or 0 for a step of zero length.
 fn over(x: f64, z: f64) -> f64 {
     if z == 0.0 { 0.0 } else { x / z }
 }
@@ -240,7 +240,7 @@ impl Scheduler for DpmSolver {
         let [denoised, kept] = shared.convert(self.path.level(index), &input);
         self.history.insert(0, kept.clone());
         self.history.truncate(shared.order);
-        // 2. The exact part, and the polynomial as far as history goes.
+        // 2. The exact part, and the polynomial as far as the history allows.
         let order = self.order(index);
         let factors = self.factors(index, order);
         let mut next = input.sample * factors.sample + kept * factors.value;

@@ -9,7 +9,7 @@ use super::sigmas::{SigmaOptions, SigmaPath, Spread, round, take_final_zero};
 use crate::options::Options;
 use wake_nn::Result;
 
-/// Follows dx/dσ = (x − x₀)/σ by straight lines.
+/// Follows dx/dσ = (x − x₀)/σ in straight lines.
 ///
 /// # References
 ///
@@ -17,7 +17,7 @@ use wake_nn::Result;
 /// algorithm 2 without churn.
 #[derive(Debug, Clone)]
 pub(super) struct Euler {
-    /// The model is told ln σ / 4 in place of the training step.
+    /// Whether the model's input is ln σ / 4 instead of the training step.
     continuous: bool,
 }
 
@@ -60,8 +60,7 @@ mod tests {
     use crate::stable_diffusion::scheduler::SchedulerConfig;
     use std::path::Path;
 
-    /// Continuous steps are ln σ / 4, in the precision of f32, for models of v; models of the noise keep the steps of their
-    /// training.
+    /// Continuous steps are ln σ / 4, in f32, for models that predict v; models that predict the noise keep their training steps.
     #[test]
     fn continuous_steps_are_logarithms_of_the_level() {
         let steps = |prediction: &str, kind: &str| {

@@ -9,7 +9,7 @@ use super::sigma_sampler::{Call, SigmaConfig, SigmaMethod};
 use crate::options::Options;
 use wake_nn::Result;
 
-/// Steps further down than the next level, and adds noise to come back up to it.
+/// Steps below the next level, and adds noise to return to it.
 ///
 /// ```text
 /// σ_up² = σ'² (σ² − σ'²)/σ²        σ_down² = σ'² − σ_up²
@@ -34,12 +34,12 @@ impl SigmaMethod for EulerAncestral {
     fn advance(&mut self, call: Call<'_>) -> Tensor<4> {
         let (sigma, next) = call.ends();
         let (up, down) = ancestral_step(sigma, next);
-        // Down along the slope, and up with noise.
+        // Down along the slope, then up with noise.
         call.sample + call.slope * (down - sigma) + required(call.noise) * up
     }
 }
 
-/// The levels `σ_up` and `σ_down` of a step from σ to σ'.
+/// Levels `σ_up` and `σ_down` of a step from σ to σ'.
 fn ancestral_step(sigma: f64, next: f64) -> (f64, f64) {
     let up = (next * next * (sigma * sigma - next * next) / (sigma * sigma))
         .max(0.0)

@@ -12,12 +12,12 @@ use wake_nn::{Result, check_range};
 pub(super) struct FlowMatchEulerConfig {
     train: usize,
     shift: f64,
-    /// The noise level to stretch the last step to.
+    /// Noise level to which the last step is stretched.
     terminal: Option<f64>,
     sigmas: SigmaOptions,
-    /// From image to noise.
+    /// Whether the path runs from image to noise.
     inverted: bool,
-    /// Every step denoises fully and adds fresh noise.
+    /// Whether every step denoises fully and adds fresh noise.
     stochastic: bool,
 }
 
@@ -69,7 +69,7 @@ impl Method for FlowMatchEulerConfig {
 }
 
 impl FlowMatchEulerConfig {
-    /// Noise levels from 1 down. diffusers shifts twice: the ends of its range, then every level.
+    /// Noise levels, falling from 1. diffusers shifts twice: the ends of its range, then every level.
     fn levels(&self, n: usize) -> Vec<f64> {
         let train = self.train as f64;
         let (first, last) = (

@@ -64,7 +64,7 @@ impl SigmaMethod for Heun {
     }
 }
 
-/// Every entry twice but the first and the last few.
+/// Repeats every entry twice, except the first and the last few.
 fn doubled(entries: &[f64], single_at_end: usize) -> Vec<f64> {
     let last = entries.len() - single_at_end;
     let twice = entries.iter().enumerate().flat_map(|(i, &entry)| {

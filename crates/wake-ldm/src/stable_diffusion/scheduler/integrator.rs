@@ -1,4 +1,4 @@
-//! What the exponential integrators share: their options, and what they keep of a prediction.
+//! Options and history shared by the exponential integrators.
 
 use burn::tensor::Tensor;
 
@@ -13,7 +13,7 @@ use wake_nn::Result;
 pub(super) struct IntegratorOptions {
     pub(super) prediction: Prediction,
     pub(super) clipping: Clipping,
-    /// In terms of the clean image, or else of the noise.
+    /// Whether the equation is solved in terms of the clean image; otherwise in terms of the noise.
     pub(super) data: bool,
     pub(super) order: usize,
     pub(super) lower_order_final: bool,
@@ -37,7 +37,7 @@ impl IntegratorOptions {
         })
     }
 
-    /// The clean image that a prediction stands for, limited, and what the history keeps of it.
+    /// Clipped clean image of a prediction, and the quantity that the history keeps.
     pub(super) fn convert(&self, level: NoiseLevel, input: &StepInput) -> [Tensor<4>; 2] {
         let denoised = input.denoised(level, self.prediction, self.clipping);
         let kept = if self.data {

@@ -1,7 +1,7 @@
-//! The names of all options that schedulers of diffusers write.
+//! Names of all options that diffusers' schedulers write.
 
-/// Options that some scheduler has. Where a file carries an option of another scheduler, which
-/// happens when diffusers changes the class, it is without effect there and here.
+/// Options of any scheduler. If a file carries an option of another scheduler, which happens when
+/// diffusers changes the class, the option has no effect in diffusers or here.
 pub(super) const KNOWN: [&str; 58] = [
     "algorithm_type",
     "base_image_seq_len",
@@ -52,7 +52,7 @@ pub(super) const KNOWN: [&str; 58] = [
     "use_karras_sigmas",
     "use_lu_lambdas",
     "variance_type",
-    // Of schedulers that are not implemented, as files that were converted carry them.
+    // From schedulers that are not implemented, as found in converted files.
     "corrector_order",
     "predictor_order",
     "rho",

@@ -9,7 +9,7 @@ use super::{
 use crate::options::Options;
 use wake_nn::{Result, check_range};
 
-/// The standard deviation of the data that the boundary condition assumes.
+/// Standard deviation of the data that the boundary condition assumes.
 const SIGMA_DATA: f64 = 0.5;
 
 /// Options of [`Lcm`].
@@ -63,7 +63,7 @@ impl Method for LcmConfig {
     }
 }
 
-/// n of the steps that the model was distilled at, from the noisiest down.
+/// Chooses n of the distillation steps, from noisy to clean.
 fn visited(train: usize, original: usize, n: usize) -> Vec<i64> {
     let stride = train / original;
     let nth = |i: usize| (i as f64 * (original as f64 / n as f64)).floor() as usize;
@@ -72,7 +72,7 @@ fn visited(train: usize, original: usize, n: usize) -> Vec<i64> {
         .collect()
 }
 
-/// The sampler of a consistency model: denoise, and add noise again up to the next level.
+/// Sampler of a consistency model, which denoises and adds noise again up to the next level.
 ///
 /// ```text
 /// f(x, t) = c_skip x + c_out x₀        τ = 10 t
@@ -104,14 +104,14 @@ impl Scheduler for Lcm {
     }
 
     fn step(&mut self, input: StepInput) -> StepOutput {
-        // 1. The clean image that the prediction stands for, limited.
+        // 1. The clean image of the prediction, clipped.
         let level = self.noise_level(input.index);
         let clean = input.denoised(level, self.prediction, self.clipping);
-        // 2. The boundary condition: at t = 0 the sample itself.
+        // 2. The boundary condition: at t = 0 the result is the sample itself.
         let tau = self.path.timesteps[input.index] * self.timestep_scaling;
         let skip = SIGMA_DATA * SIGMA_DATA / (tau * tau + SIGMA_DATA * SIGMA_DATA);
         let denoised = clean * (tau / tau.hypot(SIGMA_DATA)) + input.sample * skip;
-        // 3. Up to the next level, except on arrival.
+        // 3. Up to the next level, except in the last step.
         let sample = if self.needs_noise(input.index) {
             self.noise_level(input.index + 1)
                 .mix(denoised.clone(), required(input.noise))

@@ -9,14 +9,14 @@ use super::sigmas::{SigmaOptions, Spread};
 use crate::options::Options;
 use wake_nn::{Result, check_range};
 
-/// A polynomial through the slopes of the last four levels, integrated to the next.
+/// Multistep method that integrates a polynomial through the slopes of the last four levels.
 ///
 /// ```text
 /// x' = x + Σⱼ cⱼ dᵢ₋ⱼ        cⱼ = ∫ ∏_{k≠j} (σ − σᵢ₋ₖ)/(σᵢ₋ⱼ − σᵢ₋ₖ) dσ  from σᵢ to σᵢ₊₁
 /// ```
 ///
-/// The integrals are taken in closed form. Started in the middle, it begins at first order again
-/// (diffusers does not, and uses weights of slopes that it does not have).
+/// The integrals are computed in closed form. A run started in the middle begins with first order again
+/// (diffusers does not, and uses weights for slopes that it does not have).
 ///
 /// # References
 ///
@@ -50,7 +50,7 @@ impl SigmaMethod for Lms {
         let (_, next) = call.ends();
         self.slopes.insert(0, call.slope);
         self.slopes.truncate(self.order);
-        // A level visited twice tells nothing new, and ends what may be leaned on.
+        // A level visited twice adds nothing, and older slopes cannot be used.
         let nodes: Vec<f64> = (0..self.slopes.len())
             .map(|back| call.sigmas[call.index - back])
             .collect();
@@ -64,7 +64,7 @@ impl SigmaMethod for Lms {
     }
 }
 
-/// ∫ of each Lagrange polynomial on the nodes, from the first node to `end`.
+/// Integral of each Lagrange polynomial on the nodes, from the first node to `end`.
 fn interpolation_weights(nodes: &[f64], end: f64) -> Vec<f64> {
     // Shifted to the first node and scaled to the step, so that powers stay of order one.
     let length = end - nodes[0];
@@ -94,7 +94,7 @@ fn lagrange(nodes: &[f64], j: usize) -> Vec<f64> {
     })
 }
 
-/// ∫₀¹ of a polynomial.
+/// Integral of a polynomial from 0 to 1.
 fn unit_integral(polynomial: &[f64]) -> f64 {
     polynomial
         .iter()
@@ -117,7 +117,7 @@ mod tests {
         }
     }
 
-    /// Order of a method: it integrates polynomials of lower degree exactly, on any nodes.
+    /// The method integrates polynomials of degree below its order exactly, on any nodes.
     #[test]
     fn polynomials_of_lower_degree_are_integrated_exactly() {
         let nodes = [1.749, 3.169, 5.478, 9.103];

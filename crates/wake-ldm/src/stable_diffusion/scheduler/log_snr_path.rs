@@ -1,15 +1,15 @@
-//! The path of the exponential integrators: whole training steps, and levels in λ = ln(α/σ).
+//! Path of the exponential integrators: whole training steps, and levels in λ = ln(α/σ).
 
 use super::sigmas::{SigmaOptions, SigmaTable, Spread, check_positive, round};
 use super::spacing::{Steps, linspace};
 use super::{NoiseLevel, NoiseSchedule};
 use wake_nn::Result;
 
-/// What an exponential integrator visits.
+/// Steps and levels visited by an exponential integrator.
 #[derive(Debug, Clone)]
 pub(super) struct LogSnrPath {
     pub(super) timesteps: Vec<f64>,
-    /// One more than timesteps.
+    /// One more than `timesteps`.
     sigmas: Vec<f64>,
     flow: bool,
 }
@@ -20,7 +20,7 @@ pub(super) struct PathOptions {
     pub(super) steps: Steps,
     pub(super) sigmas: SigmaOptions,
     pub(super) end_at_zero: bool,
-    /// Training steps of spread levels are rounded, and not cut off.
+    /// Whether training steps of spread levels are rounded instead of truncated.
     pub(super) round_steps: bool,
 }
 
@@ -53,7 +53,7 @@ impl PathOptions {
         })
     }
 
-    /// Levels spread over all of training, and their training steps.
+    /// Levels spread over the whole training range, and their training steps.
     fn spread(&self, table: &SigmaTable, n: usize) -> (Vec<f64>, Vec<f64>) {
         let sigmas = self.sigmas.respread(&table.falling(), n);
         let whole = |t: f64| {
@@ -71,7 +71,7 @@ impl PathOptions {
         (sigmas, timesteps)
     }
 
-    /// Levels of a straight path, shifted, and their training steps.
+    /// Shifted levels of a straight path, and their training steps.
     fn flow(&self, train: f64, n: usize) -> (Vec<f64>, Vec<f64>) {
         let shift = self.sigmas.flow_shift;
         let mut alphas = linspace(1.0, 1.0 / train, n + 1);
@@ -84,13 +84,13 @@ impl PathOptions {
     }
 }
 
-/// The part of a step that is solved exactly, x' = `sample` · x + …, and what the rest needs.
+/// Exactly solved part of a step, x' = `sample` · x + …, with the factors of the rest.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ExactPart {
     pub(super) sample: f64,
     /// Factor of the integral over the predictions.
     pub(super) amplitude: f64,
-    /// The step in λ, counted down in terms of the clean image and up in terms of the noise.
+    /// Step in λ, negative in terms of the clean image and positive in terms of the noise.
     pub(super) h: f64,
 }
 
@@ -100,7 +100,7 @@ impl LogSnrPath {
         self.timesteps.len()
     }
 
-    /// The level before a step, or after the last.
+    /// Noise level before a step, or after the last.
     pub(super) fn level(&self, index: usize) -> NoiseLevel {
         let sigma = self.sigmas[index];
         if self.flow {
@@ -116,18 +116,18 @@ impl LogSnrPath {
         }
     }
 
-    /// λ = ln(α/σ) before a step, or after the last; infinite where there is no noise.
+    /// λ = ln(α/σ) before a step, or after the last; infinite without noise.
     pub(super) fn log_snr(&self, index: usize) -> f64 {
         let NoiseLevel { signal, noise } = self.level(index);
         signal.ln() - noise.ln()
     }
 
-    /// The length of a step in λ; 0 between equal levels.
+    /// Length of a step in λ; 0 between equal levels.
     pub(super) fn length(&self, index: usize) -> f64 {
         self.log_snr(index + 1) - self.log_snr(index)
     }
 
-    /// The exact part of a step in terms of the clean image (`data`), or else of the noise.
+    /// Exact part of a step in terms of the clean image (`data`), or otherwise of the noise.
     pub(super) fn exact_part(&self, index: usize, data: bool) -> ExactPart {
         let (now, next) = (self.level(index), self.level(index + 1));
         let length = self.length(index);
@@ -146,8 +146,8 @@ impl LogSnrPath {
         }
     }
 
-    /// The order that a step can have: at most `wanted`, as far as the `known` predictions go, and
-    /// none from before a level that is visited twice, which would divide by zero.
+    /// Order that a step can have: at most `wanted` and as far as the `known` predictions go, without
+    /// predictions from before a level that is visited twice, which would cause a division by zero.
     pub(super) fn order(&self, index: usize, wanted: usize, known: usize) -> usize {
         let moves = |back: &usize| {
             let from = index.checked_sub(*back);

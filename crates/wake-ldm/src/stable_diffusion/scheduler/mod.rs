@@ -1,8 +1,7 @@
-//! Noise schedulers: which noise levels a sampler visits, and how it moves from one to the next.
+//! Noise schedulers, which choose the noise levels of a sampler and step from one level to the next.
 //!
-//! A model is asked once per entry of [`Scheduler::timesteps`]; its answer and the current sample go
-//! into [`Scheduler::step`]. A scheduler belongs to one run: it keeps what a multistep method
-//! remembers.
+//! The model is called once per entry of [`Scheduler::timesteps`]; its prediction and the current sample
+//! are passed to [`Scheduler::step`]. A scheduler belongs to one run, because it holds the history of a multistep method.
 //!
 //! ```text
 //! x = init_noise_sigma · n
@@ -48,26 +47,26 @@ pub use prediction::{Clipping, NoiseLevel, Prediction};
 pub use schedule::NoiseSchedule;
 pub use spacing::Spacing;
 
-/// One call of the model, and what a scheduler needs to move on.
+/// One call of the model, with the inputs of a scheduler's step.
 #[derive(Debug)]
 pub struct StepInput {
-    /// Which entry of [`Scheduler::timesteps`] this is.
+    /// Index of the call in [`Scheduler::timesteps`].
     pub index: usize,
     /// Prediction of the model, shaped like the sample.
     pub prediction: Tensor<4>,
-    /// The noisy sample as it was before [`Scheduler::scale_model_input`].
+    /// Noisy sample before [`Scheduler::scale_model_input`].
     pub sample: Tensor<4>,
-    /// Fresh standard normal noise where [`Scheduler::needs_noise`] asks for it.
+    /// Fresh standard normal noise if [`Scheduler::needs_noise`].
     pub noise: Option<Tensor<4>>,
 }
 
 impl StepInput {
-    /// The clean image that the prediction stands for, limited.
+    /// Clean image of the prediction, clipped.
     fn denoised(&self, level: NoiseLevel, kind: Prediction, clipping: Clipping) -> Tensor<4> {
         clipping.apply(kind.denoised(level, self.sample.clone(), self.prediction.clone()))
     }
 
-    /// The noise that the prediction stands for.
+    /// Noise of the prediction.
     fn direction(&self, level: NoiseLevel, kind: Prediction) -> Tensor<4> {
         kind.noise(level, self.sample.clone(), self.prediction.clone())
     }
@@ -78,28 +77,28 @@ impl StepInput {
 pub struct StepOutput {
     /// The sample at the next noise level.
     pub sample: Tensor<4>,
-    /// The clean image as the method sees it after this call of the model: a preview.
+    /// Estimate of the clean image after this call of the model: a preview.
     pub denoised: Tensor<4>,
 }
 
 /// A method that turns noise into an image, step by step.
 pub trait Scheduler: std::fmt::Debug + Send {
-    /// The training steps that the model is asked at, one per call; may repeat or be fractions.
+    /// Training steps at which the model is called, one per call; they may repeat or be fractions.
     fn timesteps(&self) -> &[f64];
 
-    /// What standard normal noise is multiplied with to give the first sample.
+    /// Factor of standard normal noise that gives the first sample.
     fn init_noise_sigma(&self) -> f64 {
         1.0
     }
 
-    /// The noise level of the sample before step `index`.
+    /// Noise level of the sample before step `index`.
     ///
     /// # Panics
     ///
     /// When `index` is not that of a timestep.
     fn noise_level(&self, index: usize) -> NoiseLevel;
 
-    /// The sample as the model wants to see it.
+    /// Sample scaled as input of the model.
     ///
     /// # Panics
     ///
@@ -108,17 +107,17 @@ pub trait Scheduler: std::fmt::Debug + Send {
         sample
     }
 
-    /// Whether step `index` draws noise.
+    /// Whether step `index` needs noise.
     fn needs_noise(&self, _index: usize) -> bool {
         false
     }
 
-    /// How many calls of the model one step of the schedule takes, once it is under way.
+    /// Number of model calls per step of the schedule, except near the ends of a run.
     fn calls_per_step(&self) -> usize {
         1
     }
 
-    /// A clean image brought to the noise level before step `index`, to start there.
+    /// Clean image brought to the noise level before step `index`, to start there.
     ///
     /// # Panics
     ///
@@ -133,26 +132,26 @@ pub trait Scheduler: std::fmt::Debug + Send {
     ///
     /// # Panics
     ///
-    /// When `index` is not that of a timestep, or noise is missing where
-    /// [`needs_noise`](Self::needs_noise) asks for it.
+    /// When `index` is not that of a timestep, or noise is missing although
+    /// [`needs_noise`](Self::needs_noise) is true.
     fn step(&mut self, input: StepInput) -> StepOutput;
 }
 
-/// The options of a method, read and checked: what runs are started from.
+/// Options of a method, read and checked, from which runs are started.
 trait Method: std::fmt::Debug + Send + Sync {
     /// Reads the method's options.
     fn take(options: &mut Options) -> Result<Self>
     where
         Self: Sized;
 
-    /// The noise of the training steps; `None` for straight paths, which have none.
+    /// Noise of the training steps; `None` for straight paths, which have none.
     fn schedule(&self) -> Option<&NoiseSchedule>;
 
-    /// A scheduler for a run of n steps.
+    /// Makes a scheduler for a run of n steps.
     fn start(&self, n: usize) -> Result<Box<dyn Scheduler>>;
 }
 
-/// The noise of a step that must have some.
+/// Noise of a step that needs some.
 fn required(noise: Option<Tensor<4>>) -> Tensor<4> {
     noise.expect("`needs_noise` asked for noise, and none was given")
 }

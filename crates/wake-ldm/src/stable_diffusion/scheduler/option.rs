@@ -1,36 +1,36 @@
-//! The options of schedulers that programs set; all others come from configuration files.
+//! Scheduler options that programs set; all others come from configuration files.
 
 use serde_json::Value;
 
 use super::prediction::Prediction;
 use super::spacing::Spacing;
 
-/// An option that changes the numbers of a scheduler; methods that do not know it leave it alone, as diffusers does.
+/// Option of a scheduler; methods that do not have it ignore it, as in diffusers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum SchedulerOption {
-    /// What the model predicts (`prediction_type`).
+    /// Quantity that the model predicts (`prediction_type`).
     Prediction(Prediction),
-    /// How the visited steps are spread (`timestep_spacing`).
+    /// Spacing of the visited steps (`timestep_spacing`).
     Spacing(Spacing),
-    /// What is added to steps with leading spacing (`steps_offset`).
+    /// Number added to steps with leading spacing (`steps_offset`).
     StepsOffset(usize),
     /// Noise levels of Karras et al. (2022), Eq. 5 (`use_karras_sigmas`).
     KarrasSigmas(bool),
     /// A schedule without signal in its last step (`rescale_betas_zero_snr`).
     ZeroTerminalSnr(bool),
-    /// Clean images held in [−1, 1] (`clip_sample`).
+    /// Whether clean images are clipped to [−1, 1] (`clip_sample`).
     ClipSample(bool),
-    /// The order of DPM-Solver++ and UniPC (`solver_order`).
+    /// Order of DPM-Solver++ and UniPC (`solver_order`).
     SolverOrder(usize),
-    /// The order of LMS (`order`, an argument of diffusers' steps).
+    /// Order of LMS (`order`, an argument of diffusers' steps).
     LmsOrder(usize),
-    /// How much noise DDIM adds, 0 to 1 (`eta`, an argument of diffusers' steps).
+    /// Amount of noise that DDIM adds, 0 to 1 (`eta`, an argument of diffusers' steps).
     Eta(f64),
 }
 
 impl SchedulerOption {
-    /// The option in diffusers' words.
+    /// Key and value of the option in diffusers.
     pub(super) fn entry(self) -> (&'static str, Value) {
         match self {
             Self::Prediction(kind) => ("prediction_type", kind.name().into()),

@@ -10,7 +10,7 @@ use super::{Method, NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput}
 use crate::options::Options;
 use wake_nn::Result;
 
-/// Steps that the Runge-Kutta start needs.
+/// Steps needed by the Runge-Kutta start.
 const ORDER: usize = 4;
 
 /// Options of [`Pndm`].
@@ -67,7 +67,7 @@ impl Method for PndmConfig {
     }
 }
 
-/// All steps, the second twice.
+/// All steps, with the second one repeated.
 fn multistep_calls(steps: &[i64]) -> Vec<i64> {
     let second = steps.get(1).copied();
     steps
@@ -79,7 +79,7 @@ fn multistep_calls(steps: &[i64]) -> Vec<i64> {
         .collect()
 }
 
-/// Four calls for each of the first three steps, one for each further; and how many come first.
+/// Four calls for each of the first three steps and one for each later step; also returns the number of the first calls.
 fn with_runge_kutta(steps: &[i64], half: usize) -> (Vec<i64>, usize) {
     let mut calls = Vec::new();
     for i in 0..ORDER - 1 {
@@ -91,13 +91,13 @@ fn with_runge_kutta(steps: &[i64], half: usize) -> (Vec<i64>, usize) {
     (calls, first)
 }
 
-/// The multistep sampler of Stable Diffusion v1.4.
+/// Multistep sampler of Stable Diffusion v1.4.
 ///
-/// Starts with four Runge-Kutta calls for each of three steps, or (as Stable Diffusion does) with
-/// one step taken twice; then fits a cubic through the last four predictions.
+/// It starts with four Runge-Kutta calls for each of three steps or (as in Stable Diffusion) with
+/// one step taken twice; it then fits a cubic through the last four predictions.
 ///
-/// Started in the middle (from an image) it follows diffusers: the second call repeats the first
-/// step, so that the sample stays one step behind the timesteps.
+/// Started in the middle (from an image), it follows diffusers: the second call repeats the first
+/// step, so the sample stays one step behind the timesteps.
 ///
 /// # References
 ///
@@ -112,14 +112,14 @@ struct Pndm {
     calls: usize,
     /// The last predictions, newest last.
     history: Vec<Tensor<4>>,
-    /// The sample at the start of a Runge-Kutta step, or of the step that is taken twice.
+    /// Sample at the start of a Runge-Kutta step, or of the step that is taken twice.
     saved: Option<Tensor<4>>,
     /// Weighted sum of the predictions of a Runge-Kutta step.
     sum: Option<Tensor<4>>,
 }
 
 impl Pndm {
-    /// Carries a sample from one training step to another, Eq. 11.
+    /// Moves a sample from one training step to another, Eq. 11.
     fn transfer(&self, sample: Tensor<4>, from: i64, to: i64, prediction: Tensor<4>) -> StepOutput {
         let PndmConfig {
             schedule,
@@ -190,7 +190,7 @@ impl Pndm {
     }
 }
 
-/// The polynomial through the last predictions, integrated over the next step.
+/// Integral over the next step of the polynomial through the last predictions.
 fn adams_bashforth(history: &[Tensor<4>]) -> Tensor<4> {
     let weights: &[f64] = match history.len() {
         1 => &[1.0],

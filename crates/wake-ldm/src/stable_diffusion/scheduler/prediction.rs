@@ -1,4 +1,4 @@
-//! What a model's answer means, and how it is limited.
+//! Meaning of a model's prediction, and clipping of the clean image.
 
 use burn::tensor::Tensor;
 
@@ -24,7 +24,7 @@ impl NoiseLevel {
         clean * self.signal + noise * self.noise
     }
 
-    /// The target of v-prediction, α n − σ x₀.
+    /// Target of v-prediction, α n − σ x₀.
     ///
     /// # References
     ///
@@ -49,10 +49,10 @@ pub enum Prediction {
 }
 
 impl Prediction {
-    /// What models of curved paths, α² + σ² = 1, are trained to predict.
+    /// Predictions for models of curved paths, α² + σ² = 1.
     pub(super) const CURVED: [Self; 3] = [Self::Epsilon, Self::Sample, Self::Velocity];
 
-    /// The clean image that a prediction stands for.
+    /// Clean image of a prediction.
     ///
     /// ```text
     /// ε: (x − σ ε)/α     v: (α x/s − σ v)/s, s² = α² + σ²     flow: x − σ v
@@ -75,7 +75,7 @@ impl Prediction {
         }
     }
 
-    /// The noise that a prediction stands for.
+    /// Noise of a prediction.
     ///
     /// ```text
     /// x₀: (x − α x₀)/σ     v: (α v + σ x/s)/s     flow: x + (1 − σ) v
@@ -93,13 +93,13 @@ impl Prediction {
         }
     }
 
-    /// Reads `prediction_type`, of which a method may know some.
+    /// Reads `prediction_type`, of which a method may support only some values.
     pub(super) fn take(options: &mut Options, known: &[Self]) -> Result<Self> {
         let known: Vec<_> = known.iter().map(|kind| (kind.name(), *kind)).collect();
         options.choice("prediction_type", "epsilon", &known)
     }
 
-    /// Its name in diffusers.
+    /// Name in diffusers.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Epsilon => "epsilon",
@@ -109,7 +109,7 @@ impl Prediction {
         }
     }
 
-    /// Refuses a noise level without signal where the clean image would be divided by it.
+    /// Rejects a noise level without signal if the clean image would be divided by it.
     pub(super) fn check_signal(self, signal: f64) -> Result<()> {
         if self != Self::Epsilon || signal > 0.0 {
             return Ok(());
@@ -124,29 +124,29 @@ impl Prediction {
     }
 }
 
-/// Limits of the predicted clean image.
+/// Clipping of the predicted clean image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Clipping {
-    /// Not at all: what latent images need.
+    /// No clipping, as latent images need it.
     Off,
-    /// To ± a number.
+    /// Clipping to ± a number.
     Range(f64),
-    /// Per image, to the quantile of its absolute values, and divided by that.
+    /// Clipping of each image to a quantile of its absolute values, and division by that.
     ///
     /// # References
     ///
     /// Saharia et al. (2022), "Photorealistic Text-to-Image Diffusion Models with Deep Language
     /// Understanding", section 2.3.
     Dynamic {
-        /// Which quantile, in [0, 1].
+        /// Quantile, in [0, 1].
         ratio: f64,
-        /// The largest limit; the smallest is 1.
+        /// Largest limit; the smallest is 1.
         max: f64,
     },
 }
 
 impl Clipping {
-    /// Limits the images of a batch.
+    /// Clips the images of a batch.
     pub fn apply(self, denoised: Tensor<4>) -> Tensor<4> {
         match self {
             Self::Off => denoised,
@@ -161,7 +161,7 @@ impl Clipping {
         }
     }
 
-    /// Reads `clip_sample`, `thresholding` and the numbers that go with them.
+    /// Reads `clip_sample`, `thresholding` and their numbers.
     pub(super) fn take(options: &mut Options, clip_by_default: bool) -> Result<Self> {
         let range = Self::take_range(options, clip_by_default)?;
         Ok(match Self::take_dynamic(options)? {
@@ -178,7 +178,7 @@ impl Clipping {
         Ok(if clip { Self::Range(range) } else { Self::Off })
     }
 
-    /// Reads `thresholding` and the numbers that go with it.
+    /// Reads `thresholding` and its numbers.
     pub(super) fn take_dynamic(options: &mut Options) -> Result<Self> {
         let ratio = options.f64("dynamic_thresholding_ratio", 0.995)?;
         let max = options.f64("sample_max_value", 1.0)?;
@@ -193,7 +193,7 @@ impl Clipping {
     }
 }
 
-/// The quantile of each image, linear between its elements, as `[batch, 1, 1, 1]`.
+/// Quantile of each image, interpolated linearly between its elements, as `[batch, 1, 1, 1]`.
 fn quantile(x: Tensor<4>, ratio: f64) -> Tensor<4> {
     let [batch, channels, rows, columns] = x.dims();
     let count = channels * rows * columns;
@@ -212,8 +212,8 @@ mod tests {
     use super::*;
     use burn::tensor::Device;
 
-    /// Each prediction of a mixture x = α x₀ + σ n, by its definition, stands for that image and that noise, on curved paths
-    /// of any length s and on the straight one.
+    /// For a mixture x = α x₀ + σ n, each prediction as defined gives back the image and the noise, on curved paths of any
+    /// length s and on the straight path.
     #[test]
     fn predictions_stand_for_the_image_and_the_noise_of_a_mixture() {
         let device = Device::flex();
@@ -224,7 +224,7 @@ mod tests {
                 signal,
                 noise: sigma,
             };
-            // v of Salimans and Ho, of the mixture scaled to α² + σ² = 1.
+            // v of Salimans and Ho for the mixture scaled to α² + σ² = 1.
             let velocity = curved.velocity(clean.clone(), noise.clone()) / signal.hypot(sigma);
             let straight = NoiseLevel {
                 signal: 0.375,
@@ -242,7 +242,7 @@ mod tests {
                     kind.noise(level, mixture, prediction) - noise.clone(),
                 ];
                 for difference in found {
-                    // A few roundings of numbers up to 4, over an α or σ of at least 0.28.
+                    // A few roundings of numbers up to 4, divided by an α or σ of at least 0.28.
                     let largest: f32 = difference.abs().max().into_scalar();
                     assert!(largest < 1e-5, "{kind:?} {level:?}: {largest:e}");
                 }

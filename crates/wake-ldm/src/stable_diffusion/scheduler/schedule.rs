@@ -1,18 +1,18 @@
-//! How much noise each training step adds, and how much has gathered up to it.
+//! Noise added by each training step, and its accumulation.
 
 use super::betas::{BetaCurve, ScheduleDefaults, TerminalSnr};
 use super::prediction::NoiseLevel;
 use crate::options::Options;
 use wake_nn::{Result, check_range};
 
-/// The signal that is left after each training step.
+/// Signal left after each training step.
 ///
 /// ```text
 /// ᾱₜ = ∏ₛ₌₀ᵗ (1 − βₛ)        xₜ = √ᾱₜ x₀ + √(1 − ᾱₜ) n
 /// ```
 ///
 /// Numbers are rounded to f32 where PyTorch rounds them, because the models were trained with
-/// those: the last steps of a cosine schedule differ in the fifth digit.
+/// those; otherwise the last steps of a cosine schedule would differ in the fifth digit.
 ///
 /// # References
 ///
@@ -26,12 +26,12 @@ pub struct NoiseSchedule {
 }
 
 impl NoiseSchedule {
-    /// The schedule of a number of training steps.
+    /// Makes the schedule of a number of training steps.
     ///
     /// # Errors
     ///
     /// [`Error::OutOfRange`](wake_nn::Error::OutOfRange) for fewer than 2 or more than 100,000 steps, for a first or last β
-    /// outside [1e-8, 0.9999], or for a β given one by one outside [0, 1] (excluding 0 first).
+    /// outside [1e-8, 0.9999], or for a β given one by one outside [0, 1] (0 is not allowed for the first).
     pub fn new(curve: &BetaCurve, steps: usize, terminal: TerminalSnr) -> Result<Self> {
         check_range("num_train_timesteps", steps as f64, 2.0, 1e5)?;
         let mut betas = curve.betas(steps)?;
@@ -56,22 +56,22 @@ impl NoiseSchedule {
         self.betas.len()
     }
 
-    /// The shape of the noise added per step, before any stretching.
+    /// Shape of the noise added per step, before any stretching.
     pub fn curve(&self) -> &BetaCurve {
         &self.curve
     }
 
-    /// The noise βₜ that each step adds.
+    /// Noise βₜ added by each step.
     pub fn betas(&self) -> &[f32] {
         &self.betas
     }
 
-    /// The signal ᾱₜ left after each step (a variance).
+    /// Signal ᾱₜ left after each step (a variance).
     pub fn alphas_cumprod(&self) -> &[f32] {
         &self.alphas_cumprod
     }
 
-    /// The signal ᾱₜ left after step `t`.
+    /// Signal ᾱₜ left after step `t`.
     ///
     /// # Panics
     ///
@@ -80,7 +80,7 @@ impl NoiseSchedule {
         f64::from(self.alphas_cumprod[t])
     }
 
-    /// The signal left after step `t`; below the first step all of it, or else as much as after that.
+    /// Signal left after step `t`; before the first step it is 1, or else that after the first step.
     pub(super) fn alpha_or_end(&self, t: i64, end_at_one: bool) -> f64 {
         match usize::try_from(t) {
             Ok(t) => self.alpha_cumprod(t),
@@ -89,7 +89,7 @@ impl NoiseSchedule {
         }
     }
 
-    /// The noise level after step `t`: √ᾱₜ and √(1 − ᾱₜ).
+    /// Noise level after step `t`: √ᾱₜ and √(1 − ᾱₜ).
     ///
     /// # Panics
     ///
@@ -131,7 +131,7 @@ impl NoiseSchedule {
     }
 }
 
-/// The variance of a step back where the clean image is known, from ᾱ to ᾱ'.
+/// Variance of a reverse step from ᾱ to ᾱ', given the clean image.
 ///
 /// ```text
 /// β̃ = (1 − ᾱ')/(1 − ᾱ) (1 − ᾱ/ᾱ')
@@ -144,7 +144,7 @@ pub(super) fn posterior_variance(now: f64, next: f64) -> f64 {
     (1.0 - next) / (1.0 - now) * (1.0 - now / next)
 }
 
-/// Products of the first factors, kept in f64 and rounded one by one.
+/// Cumulative products of the factors, accumulated in f64 and each rounded to f32.
 fn cumulative_product(factors: impl Iterator<Item = f32>) -> Vec<f32> {
     let running = |product: &mut f64, factor: f32| {
         *product *= f64::from(factor);
@@ -153,7 +153,7 @@ fn cumulative_product(factors: impl Iterator<Item = f32>) -> Vec<f32> {
     factors.scan(1.0, running).collect()
 }
 
-/// Stretches √ᾱ linearly so that the last one is 0 and the first stays.
+/// Stretches √ᾱ linearly so that the last becomes 0 and the first stays.
 ///
 /// # References
 ///
@@ -190,7 +190,7 @@ mod tests {
         NoiseSchedule::new(&BetaCurve::ScaledLinear(0.00085, 0.012), 1000, terminal).unwrap()
     }
 
-    /// Published values of Stable Diffusion's schedule, to f32.
+    /// Published values of Stable Diffusion's schedule, in f32.
     #[test]
     fn stable_diffusion_schedule_has_its_known_values() {
         let schedule = stable_diffusion(TerminalSnr::Kept);
@@ -218,7 +218,7 @@ mod tests {
                 ] {
                     let schedule = NoiseSchedule::new(curve, steps, terminal).unwrap();
                     let alphas = schedule.alphas_cumprod();
-                    // The 2⁻²⁴ at the end may lie above what stretching leaves just before it.
+                    // The 2⁻²⁴ at the end may exceed what stretching leaves just before it.
                     let compared = steps - usize::from(terminal == TerminalSnr::AlmostZero);
                     let falls = alphas[..compared].windows(2).all(|pair| pair[1] < pair[0]);
                     assert!(falls, "{curve:?} {steps} {terminal:?}");
@@ -254,7 +254,7 @@ mod tests {
         assert_eq!(error, "length of trained_betas is 1, outside [3, 3]");
     }
 
-    /// Published variances of the linear schedule.
+    /// Variances of the linear schedule equal the published ones.
     #[test]
     fn variances_are_the_published_ones() {
         let curve = BetaCurve::Linear(1e-4, 0.02);

@@ -1,4 +1,4 @@
-//! What the methods share that follow dx/dσ = (x − x₀)/σ: options, path, and the slope at each call.
+//! Options, path and slopes shared by the methods that follow dx/dσ = (x − x₀)/σ.
 
 use burn::tensor::Tensor;
 
@@ -10,12 +10,12 @@ use super::{Method, NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput}
 use crate::options::Options;
 use wake_nn::Result;
 
-/// One way to move along the slope.
+/// A method that moves along the slope.
 pub(super) trait SigmaMethod: std::fmt::Debug + Clone + Send + Sync + 'static {
     /// Reads the method and its options.
     fn take(options: &mut Options) -> Result<SigmaConfig<Self>>;
 
-    /// The path as this method visits it.
+    /// Path as this method visits it.
     fn visited(&self, path: SigmaPath) -> SigmaPath {
         path
     }
@@ -28,30 +28,30 @@ pub(super) trait SigmaMethod: std::fmt::Debug + Clone + Send + Sync + 'static {
         1
     }
 
-    /// The sample at the next level.
+    /// Returns the sample at the next level.
     fn advance(&mut self, call: Call<'_>) -> Tensor<4>;
 }
 
-/// What is known after a call of the model.
+/// Data available after a call of the model.
 #[derive(Debug)]
 pub(super) struct Call<'a> {
     pub(super) index: usize,
-    /// All levels of the run.
+    /// All noise levels of the run.
     pub(super) sigmas: &'a [f64],
     pub(super) sample: Tensor<4>,
-    /// dx/dσ here.
+    /// dx/dσ at this level.
     pub(super) slope: Tensor<4>,
     pub(super) noise: Option<Tensor<4>>,
 }
 
 impl Call<'_> {
-    /// The level here and the next one.
+    /// This level and the next.
     pub(super) fn ends(&self) -> (f64, f64) {
         (self.sigmas[self.index], self.sigmas[self.index + 1])
     }
 }
 
-/// Options that every method in σ has.
+/// Options of every method in σ.
 #[derive(Debug, Clone)]
 pub(super) struct SigmaConfig<M> {
     pub(super) schedule: NoiseSchedule,
@@ -64,7 +64,7 @@ pub(super) struct SigmaConfig<M> {
 }
 
 impl<M: SigmaMethod> SigmaConfig<M> {
-    /// Reads schedule, spacing and prediction; the rest as most methods have it: no limits, the levels
+    /// Reads schedule, spacing and prediction, and sets the rest as for most methods: no clipping, the levels
     /// of the visited steps, 0 at the end.
     pub(super) fn take_common(
         options: &mut Options,
@@ -141,12 +141,12 @@ impl<M: SigmaMethod> Scheduler for SigmaSampler<M> {
     }
 
     fn step(&mut self, input: StepInput) -> StepOutput {
-        // 1. The clean image, limited.
+        // 1. The clean image, clipped.
         let level = self.path.level(input.index);
         let denoised = input.denoised(level, self.prediction, self.clipping);
         // 2. The slope away from it.
         let slope = (input.sample.clone() - denoised.clone()) / level.noise;
-        // 3. Along it, as the method does.
+        // 3. The step along it, by the method.
         let sample = self.method.advance(Call {
             index: input.index,
             sigmas: &self.path.sigmas,

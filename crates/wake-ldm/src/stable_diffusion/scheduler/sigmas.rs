@@ -1,45 +1,45 @@
-//! Noise levels σ between the visited training steps, for methods that work in σ = noise/signal.
+//! Noise levels σ = noise/signal of the visited training steps, for methods that work in σ.
 
 use super::spacing::{Spacing, Steps, linspace};
 use super::{NoiseLevel, NoiseSchedule};
 use crate::options::Options;
 use wake_nn::{Error, Result};
 
-/// How noise levels are spread.
+/// Spread of noise levels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Spread {
-    /// Those of the visited training steps.
+    /// Levels of the visited training steps.
     Steps,
-    /// Evenly in σ^(1/7).
+    /// Even in σ^(1/7).
     ///
     /// Karras et al. (2022), "Elucidating the Design Space of Diffusion-Based Generative Models",
     /// Eq. 5.
     Karras,
-    /// Evenly in ln σ.
+    /// Even in ln σ.
     Exponential,
-    /// Evenly in ln σ, training steps rounded.
+    /// Even in ln σ, with rounded training steps.
     ///
     /// Lu et al. (2022), "DPM-Solver++", appendix D.
     Lu,
-    /// Those of a straight path.
+    /// Levels of a straight path.
     Flow,
 }
 
-/// How the noise levels of a run are chosen.
+/// Choice of the noise levels of a run.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SigmaOptions {
     pub(super) spread: Spread,
-    /// Ends of the spread, where they are not those of the schedule.
+    /// Ends of the spread, if they differ from those of the schedule.
     pub(super) min: Option<f64>,
     pub(super) max: Option<f64>,
     /// Shift of a straight path.
     pub(super) flow_shift: f64,
-    /// Levels start out evenly in ln σ over all of training, and not at the visited steps.
+    /// Whether levels are first spaced evenly in ln σ over the whole training range, instead of at the visited steps.
     pub(super) log_linear: bool,
 }
 
 impl SigmaOptions {
-    /// The levels of the visited steps.
+    /// Levels of the visited steps.
     pub(super) const STEPS: Self = Self {
         spread: Spread::Steps,
         min: None,
@@ -48,7 +48,7 @@ impl SigmaOptions {
         log_linear: false,
     };
 
-    /// Reads which of `known` spreads is asked for.
+    /// Reads the chosen spread, one of `known`.
     pub(super) fn take(options: &mut Options, known: &[Spread]) -> Result<Self> {
         let mut spread = Spread::Steps;
         for (key, kind) in [
@@ -100,7 +100,7 @@ fn karras(first: f64, last: f64, n: usize) -> Vec<f64> {
         .collect()
 }
 
-/// The noise levels of all training steps, and what lies between them.
+/// Noise levels of all training steps, with interpolation between them.
 #[derive(Debug)]
 pub(super) struct SigmaTable {
     sigmas: Vec<f64>,
@@ -116,7 +116,7 @@ impl SigmaTable {
         }
     }
 
-    /// The smallest noise level of training.
+    /// Smallest noise level of training.
     pub(super) fn smallest(&self) -> f64 {
         self.sigmas[0]
     }
@@ -126,7 +126,7 @@ impl SigmaTable {
         self.sigmas.iter().rev().copied().collect()
     }
 
-    /// The noise level at a (fractional) training step, linear between steps, held at the ends.
+    /// Noise level at a (fractional) training step, linear between steps and constant beyond the ends.
     pub(super) fn sigma(&self, t: f64) -> f64 {
         let last = self.sigmas.len() - 1;
         let below = (t.max(0.0).floor() as usize).min(last);
@@ -135,7 +135,7 @@ impl SigmaTable {
         self.sigmas[below] + (self.sigmas[above] - self.sigmas[below]) * weight
     }
 
-    /// The (fractional) training step of a noise level, linear in ln σ, held at the ends.
+    /// (Fractional) training step of a noise level, linear in ln σ and constant beyond the ends.
     pub(super) fn timestep(&self, sigma: f64) -> f64 {
         let logarithm = sigma.max(1e-10).ln();
         let at_most = self.logarithms.partition_point(|&entry| entry <= logarithm);
@@ -146,7 +146,7 @@ impl SigmaTable {
     }
 }
 
-/// What Euler's family visits: training steps and one noise level more.
+/// Training steps visited by Euler's family, with one noise level more.
 #[derive(Debug, Clone)]
 pub(super) struct SigmaPath {
     pub(super) timesteps: Vec<f64>,
@@ -155,7 +155,7 @@ pub(super) struct SigmaPath {
 }
 
 impl SigmaPath {
-    /// The path of a method in σ: fractional steps, levels spread between those of its own ends.
+    /// Path of a method in σ, with fractional steps and levels spread between its own ends.
     pub(super) fn fractional(
         schedule: &NoiseSchedule,
         steps: Steps,
@@ -192,7 +192,7 @@ impl SigmaPath {
         })
     }
 
-    /// What noise is multiplied with at the start: σ, or √(σ² + 1) with leading spacing.
+    /// Factor of the initial noise: σ, or √(σ² + 1) with leading spacing.
     pub(super) fn init_noise_sigma(&self) -> f64 {
         let largest = self.sigmas.iter().copied().fold(0.0, f64::max);
         if self.leading {
@@ -202,7 +202,7 @@ impl SigmaPath {
         }
     }
 
-    /// The level x = x₀ + σ n before a step.
+    /// Noise level before a step, of x = x₀ + σ n.
     pub(super) fn level(&self, index: usize) -> NoiseLevel {
         NoiseLevel {
             signal: 1.0,
@@ -210,24 +210,24 @@ impl SigmaPath {
         }
     }
 
-    /// What the model's input is multiplied with: 1/√(σ² + 1).
+    /// Factor of the model's input: 1/√(σ² + 1).
     pub(super) fn input_scale(&self, index: usize) -> f64 {
         1.0 / self.sigmas[index].hypot(1.0)
     }
 }
 
-/// Rounds to what PyTorch keeps.
+/// Rounds to f32, as PyTorch does.
 pub(super) fn round(x: f64) -> f64 {
     f64::from(x as f32)
 }
 
-/// Reads `final_sigmas_type`: whether a run ends at σ = 0, or else at the smallest of training.
+/// Reads `final_sigmas_type`: whether a run ends at σ = 0 or at the smallest level of training.
 pub(super) fn take_final_zero(options: &mut Options) -> Result<bool> {
     let known = [("zero", true), ("sigma_min", false)];
     options.choice("final_sigmas_type", "zero", &known)
 }
 
-/// Refuses a path on which some noise level is not a positive number.
+/// Rejects a path on which a noise level is not a positive number.
 pub(super) fn check_positive(sigmas: &[f64]) -> Result<()> {
     match sigmas
         .iter()
@@ -253,7 +253,7 @@ mod tests {
         SigmaTable::new(&NoiseSchedule::new(&curve, 1000, TerminalSnr::Kept).unwrap())
     }
 
-    /// The Karras levels of Stable Diffusion's range, in ten steps, as a run of diffusers printed them: four decimals.
+    /// Karras levels of Stable Diffusion's range in ten steps, against the four decimals that diffusers prints.
     #[test]
     fn karras_levels_are_those_of_diffusers() {
         let expected = [

@@ -1,4 +1,4 @@
-//! Which training steps a sampler visits.
+//! Training steps that a sampler visits.
 
 use crate::options::Options;
 use wake_nn::{Error, Result, check_range};
@@ -10,18 +10,18 @@ use wake_nn::{Error, Result, check_range};
 /// Lin et al. (2024), "Common Diffusion Noise Schedules and Sample Steps are Flawed", table 2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Spacing {
-    /// Multiples of T/n from 0 up; the noisiest step is left out.
+    /// Multiples of T/n upwards from 0; the noisiest step is left out.
     Leading,
-    /// Multiples of T/n from the end down; the cleanest steps are left out.
+    /// Multiples of T/n downwards from the end; the cleanest steps are left out.
     Trailing,
-    /// Evenly from the first to the last.
+    /// Even from the first to the last.
     Linspace,
 }
 
 impl Spacing {
     const ALL: [Self; 3] = [Self::Leading, Self::Trailing, Self::Linspace];
 
-    /// Its name in diffusers.
+    /// Name in diffusers.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Leading => "leading",
@@ -34,11 +34,11 @@ impl Spacing {
 /// Spacing and offset of the visited steps.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Steps {
-    /// How they are spread.
+    /// Spacing of the steps.
     pub(super) spacing: Spacing,
     /// Added to steps with leading spacing.
     pub(super) offset: usize,
-    /// Training steps T.
+    /// Number of training steps T.
     pub(super) train: usize,
 }
 
@@ -87,7 +87,7 @@ impl Steps {
         })
     }
 
-    /// Whole training steps for methods that end one step further down, from noisy to clean.
+    /// Whole training steps from noisy to clean, for methods that end one step below the last.
     ///
     /// # Errors
     ///
@@ -122,7 +122,7 @@ impl Steps {
             .collect()
     }
 
-    /// Rounded T − i·T/n, less 1.
+    /// T − i·T/n, rounded, minus 1.
     fn trailing(self, n: usize) -> Vec<f64> {
         let train = self.train as f64;
         let ratio = train / n as f64;
@@ -132,7 +132,7 @@ impl Steps {
     }
 }
 
-/// Evenly spaced numbers from `first` to `last`; the first alone if only one is asked for.
+/// Evenly spaced numbers from `first` to `last`; only the first for n = 1.
 pub(super) fn linspace(first: f64, last: f64, n: usize) -> Vec<f64> {
     if n == 1 {
         return vec![first];
@@ -149,7 +149,7 @@ pub(super) fn linspace(first: f64, last: f64, n: usize) -> Vec<f64> {
         .collect()
 }
 
-/// The error for a number of steps that a method cannot take.
+/// Returns the error for a number of steps that a method does not support.
 pub(super) fn steps_out_of_range(n: usize, min: usize, max: usize) -> Error {
     Error::OutOfRange {
         name: "steps".to_owned(),
@@ -211,7 +211,7 @@ mod tests {
                 };
                 assert_eq!(whole.len(), n);
                 let repeats = whole.windows(2).filter(|pair| pair[1] >= pair[0]).count();
-                // 1001 points on 1000 steps: one must be visited twice.
+                // With 1001 points on 1000 steps, one step must be visited twice.
                 let allowed = usize::from(spacing == Spacing::Linspace && n == 1000);
                 assert!(repeats <= allowed, "{spacing:?} {n}: {repeats}");
             }

@@ -1,4 +1,4 @@
-//! UniPC: a predictor and a corrector of the same order, for one call per step.
+//! UniPC: a predictor and a corrector of the same order, with one call per step.
 
 use burn::tensor::Tensor;
 use serde_json::Value;
@@ -20,9 +20,9 @@ pub(super) struct UniPcConfig {
     schedule: NoiseSchedule,
     path: PathOptions,
     shared: IntegratorOptions,
-    /// B(h) = h, or else eʰ − 1.
+    /// Whether B(h) = h; otherwise it is eʰ − 1.
     plain: bool,
-    /// Steps after which nothing is corrected.
+    /// Steps that are not corrected.
     uncorrected: Vec<usize>,
 }
 
@@ -39,7 +39,7 @@ impl Method for UniPcConfig {
         let data = options.bool("predict_x0", true)?;
         let mut shared = IntegratorOptions::take(options, path.sigmas.spread, data, 4)?;
         if !data {
-            // Limits are only known for the clean image.
+            // Clipping is defined only for the clean image.
             shared.clipping = Clipping::Off;
         }
         let steps = |value: &Value| list(value, count);
@@ -70,7 +70,7 @@ impl Method for UniPcConfig {
 }
 
 impl UniPcConfig {
-    /// Combinations that end in 0/0: diffusers gives NaN for them.
+    /// Rejects combinations that end in 0/0, for which diffusers gives NaN.
     fn refuse_division_by_zero(&self, options: &Options) -> Result<()> {
         let IntegratorOptions {
             data,
@@ -110,13 +110,13 @@ impl UniPcConfig {
 }
 
 fn take_plain(options: &mut Options) -> Result<bool> {
-    // The last three are DPM-Solver's names, which diffusers takes for its default here.
+    // The last three are DPM-Solver's names, which diffusers replaces by its default here.
     let others = ["bh2", "midpoint", "heun", "logrho"].map(|name| (name, false));
     let known = [&[("bh1", true)], &others[..]].concat();
     options.choice("solver_type", "bh2", &known)
 }
 
-/// An exponential integrator whose last step is corrected once the next prediction is known.
+/// Exponential integrator that corrects its last step once the next prediction is available.
 ///
 /// | here | paper |
 /// | --- | --- |
@@ -134,11 +134,11 @@ struct UniPc {
     path: LogSnrPath,
     /// Clean images (or noises), newest first.
     history: Vec<Tensor<4>>,
-    /// Sample and order of the last prediction.
+    /// Sample and order of the last predictor step.
     last: Option<(Tensor<4>, usize)>,
 }
 
-/// One step from a level to the next, in numbers.
+/// Factors of one step from a level to the next.
 #[derive(Debug)]
 struct Update {
     /// Factor of the sample.
@@ -152,7 +152,7 @@ struct Update {
 }
 
 impl UniPc {
-    /// The numbers of the step from level `from` to the next; `None` for a step of no length.
+    /// Factors of the step from level `from` to the next; `None` for a step of zero length.
     fn update(&self, from: usize, order: usize) -> Option<Update> {
         let length = self.path.length(from);
         if length <= 0.0 {
@@ -172,7 +172,7 @@ impl UniPc {
         })
     }
 
-    /// The order of a step: the last ones may have fewer.
+    /// Order of a step, which may be lower for the last ones.
     fn order(&self, index: usize) -> usize {
         let shared = &self.config.shared;
         let left = self.path.len() - index;
@@ -185,7 +185,7 @@ impl UniPc {
             .order(index, shared.order.min(most), self.history.len())
     }
 
-    /// The sum over the differences of the history, weighted.
+    /// Weighted sum of the differences of the history.
     fn differences(&self, update: &Update, weights: &[f64]) -> Option<Tensor<4>> {
         let newest = self.history.first()?;
         let terms = self.history.iter().skip(1).zip(&update.ratios).zip(weights);
@@ -194,7 +194,7 @@ impl UniPc {
             .reduce(|sum, term| sum + term)
     }
 
-    /// The step to the next level from what is known at this one, Eq. 3.
+    /// Predicts the step to the next level from this one, Eq. 3.
     fn predict(&self, index: usize, order: usize, sample: Tensor<4>) -> Tensor<4> {
         let Some(update) = self.update(index, order) else {
             return sample;
@@ -211,7 +211,7 @@ impl UniPc {
         }
     }
 
-    /// The last step again, now that its end is known, Eq. 9.
+    /// Repeats the last step with the prediction at its end, Eq. 9.
     fn correct(&self, index: usize, sample: Tensor<4>, here: &Tensor<4>) -> Tensor<4> {
         let Some((start, order)) = self.last.clone() else {
             return sample;
@@ -246,11 +246,11 @@ impl Scheduler for UniPc {
 
     fn step(&mut self, input: StepInput) -> StepOutput {
         let index = input.index;
-        // 1. What the prediction says at the predicted sample.
+        // 1. The prediction at the predicted sample.
         let shared = &self.config.shared;
         let [denoised, kept] = shared.convert(self.path.level(index), &input);
         let mut sample = input.sample;
-        // 2. With it, the last step is corrected.
+        // 2. The last step is corrected with it.
         let corrects = index
             .checked_sub(1)
             .is_some_and(|last| !self.config.uncorrected.contains(&last));

@@ -1,6 +1,6 @@
-//! The weights of UniPC: moments of the exponential, and the system that they give.
+//! Weights of UniPC, from moments of the exponential and a linear system.
 
-/// h φₙ₊₁(h) n!/B(h) for n = 1 … order, with φ₁ = (eʰ − 1)/h and φₙ₊₁ = (φₙ − 1/n!)/h.
+/// Moments h φₙ₊₁(h) n!/B(h) for n = 1 … order, with φ₁ = (eʰ − 1)/h and φₙ₊₁ = (φₙ − 1/n!)/h.
 pub(super) fn moments(h: f64, base: f64, order: usize) -> Vec<f64> {
     let mut phi = h.exp_m1() / h - 1.0;
     let mut factorial = 1.0;
@@ -13,7 +13,7 @@ pub(super) fn moments(h: f64, base: f64, order: usize) -> Vec<f64> {
     moments
 }
 
-/// Weights w with Σⱼ rⱼ^{i} wⱼ = gᵢ for i = 0, 1, …, by Gauss-Jordan elimination with pivoting.
+/// Solves Σⱼ rⱼ^{i} wⱼ = gᵢ, i = 0, 1, …, for the weights w by Gauss-Jordan elimination with pivoting.
 pub(super) fn solve(ratios: &[f64], moments: &[f64]) -> Vec<f64> {
     let n = moments.len();
     let row = |i: usize| -> Vec<f64> {
@@ -59,7 +59,7 @@ mod tests {
         }
     }
 
-    /// The moments are h ∫₀¹ e^{(1−s)h} sⁿ ds / B(h): here by the trapezoidal rule.
+    /// The moments are h ∫₀¹ e^{(1−s)h} sⁿ ds / B(h), computed here by the trapezoidal rule.
     #[test]
     fn moments_are_integrals_of_the_exponential() {
         let h = -0.8_f64;

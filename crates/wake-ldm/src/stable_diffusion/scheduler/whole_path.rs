@@ -1,10 +1,10 @@
-//! The path of methods that step from one whole training step to another.
+//! Path of methods that step between whole training steps.
 
 use super::prediction::Prediction;
 use super::{NoiseLevel, NoiseSchedule};
 use wake_nn::{Error, Result};
 
-/// The training steps that such a method asks the model at.
+/// Training steps at which such a method calls the model.
 #[derive(Debug)]
 pub(super) struct WholePath {
     pub(super) timesteps: Vec<f64>,
@@ -13,7 +13,7 @@ pub(super) struct WholePath {
 }
 
 impl WholePath {
-    /// Refuses steps that training does not have, and a first one without signal where the clean image
+    /// Rejects steps that training does not have, and a first step without signal if the clean image
     /// would be divided by it.
     pub(super) fn new(
         steps: &[i64],
@@ -35,12 +35,12 @@ impl WholePath {
         self.visited.len()
     }
 
-    /// The training step of a call.
+    /// Training step of a call.
     pub(super) fn step(&self, index: usize) -> usize {
         self.visited[index]
     }
 
-    /// The signal ᾱ before a call, or `None` after the last.
+    /// Signal ᾱ before a call, or `None` after the last.
     pub(super) fn alpha(&self, index: usize) -> Option<f64> {
         self.alphas.get(index).copied()
     }
@@ -50,7 +50,7 @@ impl WholePath {
     }
 }
 
-/// The error for a training step that the schedule does not have.
+/// Returns an error for a training step that the schedule does not have.
 fn check_timestep(t: i64, steps: usize) -> Result<usize> {
     match usize::try_from(t) {
         Ok(index) if index < steps => Ok(index),

@@ -1,9 +1,9 @@
-//! Numbers as waves of several lengths, which a network tells apart more easily than one value.
+//! Fourier features of a scene's numbers, which a network resolves more easily than single values.
 
 use wake_physics::Scene;
 use wake_physics::scene::Polarization;
 
-/// An open range of a number.
+/// Range of a number, which values may exceed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Range {
     low: f64,
@@ -15,12 +15,12 @@ impl Range {
         Self { low, high }
     }
 
-    /// −1…1 for numbers in the range.
+    /// Scales numbers in the range to −1…1.
     pub(super) fn scaled(self, value: f64) -> f64 {
         2.0 * (value - self.low) / (self.high - self.low) - 1.0
     }
 
-    /// The number that [`scaled`](Self::scaled) made `u` of.
+    /// Inverse of [`scaled`](Self::scaled).
     pub(super) fn unscaled(self, u: f64) -> f64 {
         self.low + 0.5 * (u + 1.0) * (self.high - self.low)
     }
@@ -39,7 +39,7 @@ pub(super) const INCIDENCE: Range = Range::new(10.0, 40.0);
 
 /// log₁₀ of the ship's length \[m\].
 const LOG_LENGTH: Range = Range::new(0.5, 3.0);
-/// log₁₀ of the water depth \[m\], as far as waves feel it.
+/// log₁₀ of the water depth \[m\], as far as it affects waves.
 const LOG_DEPTH: Range = Range::new(0.0, 3.0);
 /// Significant height of the swell \[m\].
 const SWELL_HEIGHT: Range = Range::new(0.0, 6.0);
@@ -55,18 +55,18 @@ const RANGE_TO_VELOCITY: Range = Range::new(0.0, 150.0);
 const LOG_SIZE: Range = Range::new(-0.5, 2.0);
 /// Noise floor \[dB\].
 const NOISE: Range = Range::new(-40.0, 0.0);
-/// A depth beyond which no wave that matters feels the bottom \[m\].
+/// Depth beyond which the relevant waves are not affected by the bottom \[m\].
 const DEEP: f64 = 1000.0;
-/// Unit of places: a pixel of this side \[m\]. Places in pixels of other sides are given as if they had it.
+/// Reference side of a pixel \[m\]: positions on other pixels are scaled to it.
 pub(super) const TOLD_SPACING: f64 = 4.0;
 
-/// Waves per number on an open range: each has a sine and a cosine.
+/// Waves per number, each with a sine and a cosine.
 const WAVES_PER_NUMBER: usize = 4;
 /// Harmonics per direction.
 const HARMONICS: usize = 3;
 /// Flags: any ship, horizontal polarization, breaking waves.
 const FLAGS: usize = 3;
-/// Numbers on an open range: four of the ship, five of the sea, seven of radar and pixels.
+/// Numbers with a range: four of the ship, five of the sea, seven of radar and pixels.
 const NUMBERS: usize = 16;
 /// Directions: of the ship, of the wind and of the swell.
 const DIRECTIONS: usize = 3;
@@ -75,16 +75,16 @@ const DIRECTIONS: usize = 3;
 pub const FEATURES: usize =
     FLAGS + NUMBERS * (2 + 2 * WAVES_PER_NUMBER) + DIRECTIONS * (1 + 2 * HARMONICS);
 
-/// The numbers of a scene as a vector; what the scene has not is 0.
+/// Feature vector of a scene; missing values are 0.
 ///
 /// ```text
 /// number v in [a, b]:  u = 2 (v − a)/(b − a) − 1,   [1, u, sin(2^i π u/2), cos(2^i π u/2)],  i = 0…3
 /// direction φ:         [1, sin(iφ), cos(iφ)],  i = 1…3
 /// ```
 ///
-/// Of the ship, if it is the only one: speed, place, log₁₀ of its length, heading; of the sea: wind, log₁₀ of fetch and
-/// depth, swell; of the radar: incidence, frequency, R/V, resolutions, noise floor; the pixel. Values beyond a range repeat
-/// those within for the shorter waves. Gusts, slicks and echoes are in the expected image.
+/// For the ship, if there is only one: speed, position, log₁₀ of its length, heading; for the sea: wind, log₁₀ of fetch and
+/// depth, swell; for the radar: incidence, frequency, R/V, resolutions, noise floor; the pixel. For values beyond a range, the
+/// shorter waves repeat. Gusts, slicks and echoes are in the expected image.
 pub fn features(scene: &Scene) -> Vec<f32> {
     let (sea, radar, spacing) = (&scene.sea, &scene.radar, scene.grid.spacing);
     let mut out = Vec::with_capacity(FEATURES);
@@ -165,7 +165,7 @@ mod tests {
         Scene::default().with_assignments(&assignments).unwrap()
     }
 
-    /// Which features differ.
+    /// Indices of the features that differ.
     fn changed(a: &Scene, b: &Scene) -> Vec<usize> {
         let (a, b) = (features(a), features(b));
         (0..FEATURES)
@@ -182,7 +182,7 @@ mod tests {
         let of_open = features(&open);
         assert!(of_open[FLAGS..FLAGS + 4 * number].iter().all(|&x| x == 0.0));
         assert_eq!(of_open.len(), FEATURES);
-        // Of several ships none is told alone.
+        // With several ships, none has features of its own.
         let mut two = full();
         two.ships.push(two.ships[0].clone());
         assert_eq!(features(&two)[1..], of_open[1..]);
@@ -195,7 +195,7 @@ mod tests {
         assert!(changed(&full(), &turned).is_empty());
     }
 
-    /// Each number of the scene has a place of its own, and no other number moves it.
+    /// Each number of the scene has features of its own, which no other number changes.
     #[test]
     fn each_number_changes_only_its_own_features() {
         let number = 2 + 2 * WAVES_PER_NUMBER;
@@ -225,7 +225,7 @@ mod tests {
                 "{assignment}: {found:?}"
             );
         }
-        // A coarser pixel is told, and the same ship lies fewer pixels away.
+        // A coarser pixel changes its features, and the same ship is fewer pixels away.
         let coarse = full().with_assignments(&["grid.spacing=10.0"]).unwrap();
         let found = changed(&full(), &coarse);
         let last = numbers.end - number..numbers.end;

@@ -1,4 +1,4 @@
-//! Inputs of the wake model: numbers of a scene, places in the ship's frame, and words.
+//! Inputs of the wake model: numbers of a scene, positions in the ship's frame, and words.
 //!
 //! ```text
 //! prompt ─► token ids ─► compact ids ─► reader ─► numbers
@@ -7,8 +7,8 @@
 //!          └─► scene ─► image expected of it ─┘
 //! ```
 //!
-//! Whatever is not known is left out: a number that no prompt states has the flag 0 and no value, and without
-//! speed, heading and place of the ship the maps are empty.
+//! Unknown values are left out: a number that the prompt does not state has the flag 0 and no value, and without
+//! speed, heading and position of the ship the maps are empty.
 
 mod features;
 mod position_maps;

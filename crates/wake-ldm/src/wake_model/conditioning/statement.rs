@@ -1,13 +1,13 @@
-//! What a prompt states, as numbers that a network can learn to read from it.
+//! Statements of a prompt as numbers that a network can learn to read from it.
 
 use super::features::{INCIDENCE, LOG_FETCH, Range, SHIP_SPEED, WIND_SPEED};
 use wake_text::PartialScene;
 
-/// Quantities that a prompt can state: ship or not, its speed and heading, wind speed and direction, fetch,
-/// incidence.
+/// Number of quantities that a prompt can state: whether there is a ship, its speed and heading, wind speed and
+/// direction, fetch, incidence.
 pub const QUANTITIES: usize = 7;
 
-/// Whether each quantity is stated, and its value.
+/// Encodes whether each quantity is stated, and its value.
 ///
 /// ```text
 /// number in [a, b]:  [1, u, 0],  u as in features
@@ -39,11 +39,11 @@ pub fn statement(said: &PartialScene) -> Vec<f32> {
     quantities.into_iter().flat_map(triple).collect()
 }
 
-/// Values of a [`statement`]; a quantity counts as stated above ½, a number beyond its range as the end of it.
+/// Decodes a [`statement`]; a quantity is stated if its flag is above ½, and numbers are clamped to their range.
 ///
 /// # Panics
 ///
-/// When `statement` has other than `3 · QUANTITIES` numbers.
+/// When `statement` does not have `3 · QUANTITIES` numbers.
 pub fn said(statement: &[f32]) -> PartialScene {
     assert_eq!(statement.len(), 3 * QUANTITIES, "numbers of a statement");
     let value = |quantity: usize| -> Option<[f64; 2]> {
@@ -95,7 +95,7 @@ mod tests {
             (again.incidence, 32.0),
         ];
         for (found, expected) in pairs {
-            // Rounding of f32.
+            // Rounding to f32.
             assert!(
                 (found.unwrap() / expected - 1.0).abs() < 1e-5,
                 "{found:?} {expected}"

@@ -1,4 +1,4 @@
-//! Few of CLIP's 49,408 tokens occur in prompts about wakes; the others are one unknown token.
+//! Compact vocabulary: of CLIP's 49,408 tokens few occur in prompts about wakes; all others share one id.
 
 use std::collections::BTreeSet;
 
@@ -7,12 +7,12 @@ use wake_text::{Tokenizer, Wording};
 
 use crate::error::Result;
 
-/// CLIP's ids of a prompt, with marks and padding.
+/// CLIP's ids of a prompt, including marks and padding.
 pub fn tokens(prompt: &str) -> Vec<u32> {
     Tokenizer::clip().encode(prompt).ids.to_vec()
 }
 
-/// CLIP's ids that a small text transformer knows, in increasing order.
+/// CLIP's ids in the vocabulary of a small text transformer, in increasing order.
 ///
 /// Compact id 0 stands for every other token.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -21,7 +21,7 @@ pub struct Vocabulary {
 }
 
 impl Vocabulary {
-    /// The vocabulary of the given ids.
+    /// Makes the vocabulary of the given ids.
     pub fn new(ids: impl IntoIterator<Item = u32>) -> Self {
         let known: BTreeSet<u32> = ids.into_iter().collect();
         Self {
@@ -33,7 +33,7 @@ impl Vocabulary {
     ///
     /// # Errors
     ///
-    /// [`Error::Text`](crate::Error::Text), for a scene that cannot be put into words: never for the default ones, which are.
+    /// [`Error::Text`](crate::Error::Text) for a scene that cannot be put into words, which the default scenes always can.
     pub fn of_wordings() -> Result<Self> {
         let (ship, mut calm) = (Scene::default(), Scene::default());
         calm.ships.clear();
@@ -52,12 +52,12 @@ impl Vocabulary {
         &self.known
     }
 
-    /// Number of compact ids, the unknown token included.
+    /// Number of compact ids, including the unknown token.
     pub fn size(&self) -> usize {
         self.known.len() + 1
     }
 
-    /// The compact id of one of CLIP's.
+    /// Compact id of a CLIP id.
     pub fn compact(&self, id: u32) -> usize {
         self.known.binary_search(&id).map_or(0, |at| at + 1)
     }

@@ -1,4 +1,4 @@
-//! What shapes a small wake model, and how it is written down.
+//! Configuration of a small wake model, and its file.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use crate::unet::UNetConfig;
 use crate::wake_model::conditioning::{FEATURES, Vocabulary};
 use wake_nn::check_range;
 
-/// Widths of a [`WakeModel`](super::WakeModel), its image, and the tokens it knows.
+/// Widths, image and vocabulary of a [`WakeModel`](super::WakeModel).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WakeModelConfig {
@@ -20,40 +20,40 @@ pub struct WakeModelConfig {
     pub image_size: usize,
     /// Side of a pixel of [`base_scene`](Self::base_scene) \[m\].
     pub spacing: f64,
-    /// Channels of the latent image, at an eighth of the size.
+    /// Channels of the latent image, which has an eighth of the image's size.
     pub latent_channels: usize,
-    /// Squares of latent pixels that the U-Net sees as one pixel: their side.
+    /// Side of the squares of latent pixels that form one pixel of the U-Net.
     pub fold: usize,
     /// Width of each level of the U-Net; each but the last halves the image.
     pub widths: Vec<usize>,
-    /// Whether the pixels of a level attend to each other.
+    /// Whether a level has self-attention.
     pub attention: Vec<bool>,
-    /// Channels of a token in the reader.
+    /// Channels of a token in the parser.
     pub text_width: usize,
-    /// Channels of the network of mean and spread.
+    /// Width of the network of mean and spread.
     pub prior_width: usize,
-    /// Channels of the maps that join the noisy latents.
+    /// Channels of the maps that are concatenated to the noisy latents.
     pub map_channels: usize,
     /// Groups of every group normalisation.
     pub norm_groups: usize,
-    /// CLIP's ids that the parser knows.
+    /// CLIP's ids in the parser's vocabulary.
     pub vocabulary: Vec<u32>,
-    /// Scene with the values that a prompt leaves open. Its grid is ignored.
+    /// Scene with the values that a prompt leaves open; its grid is ignored.
     #[serde(default)]
     pub scene: Scene,
-    /// The scenes of all training images.
+    /// Ranges of the scenes of all training images.
     #[serde(default, rename = "domain")]
     pub training_ranges: TrainingRanges,
-    /// The mapping from σ⁰ to the grey of all training images.
+    /// Mapping from σ⁰ to the grey of all training images.
     #[serde(default)]
     pub grey: GreyScale,
 }
 
 impl WakeModelConfig {
-    /// The file of the configuration in the folder of a model.
+    /// File name of the configuration in the folder of a model.
     pub const FILE: &'static str = "config.json";
 
-    /// The shape that ships: 256 × 256 pixels of 4 m, 16 latent channels, few enough sums for two cores to learn.
+    /// Configuration of the embedded model: 256 × 256 pixels of 4 m and 16 latent channels, small enough to train on two cores.
     pub fn standard(vocabulary: &Vocabulary) -> Self {
         Self {
             image_size: 256,
@@ -73,12 +73,12 @@ impl WakeModelConfig {
         }
     }
 
-    /// Reads the JSON that serde writes.
+    /// Reads the configuration from the JSON that serde writes.
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::Json`] with `path` for text that is no such configuration, and what
-    /// [`validate`](Self::validate) finds.
+    /// [`wake_nn::Error::Json`] with `path` for text that is not such a configuration, and the errors of
+    /// [`validate`](Self::validate).
     pub fn from_json(text: &str, path: &Path) -> Result<Self> {
         let config: Self = serde_json::from_str(text).map_err(|source| {
             Error::Model(wake_nn::Error::Json {
@@ -90,11 +90,11 @@ impl WakeModelConfig {
         Ok(config)
     }
 
-    /// Reads a file of the JSON that serde writes.
+    /// Reads a file with the JSON that serde writes.
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::Io`] if it cannot be read, else as [`from_json`](Self::from_json).
+    /// [`wake_nn::Error::Io`] if the file cannot be read, otherwise as [`from_json`](Self::from_json).
     pub fn read(path: &Path) -> Result<Self> {
         Self::from_json(&whole_files::read_text(path)?, path)
     }
@@ -103,7 +103,7 @@ impl WakeModelConfig {
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::OutOfRange`] or [`wake_nn::Error::InvalidOption`] with the option at fault.
+    /// [`wake_nn::Error::OutOfRange`] or [`wake_nn::Error::InvalidOption`] with the invalid option.
     pub fn validate(&self) -> Result<()> {
         check_range("image_size", self.image_size as f64, 32.0, 4096.0)?;
         if !self.image_size.is_multiple_of(32)
@@ -133,7 +133,7 @@ impl WakeModelConfig {
         Ok(self.unet().validate()?)
     }
 
-    /// Scene with the values that a prompt leaves open, on the pixels of the model.
+    /// Scene with the values that a prompt leaves open, on the model's grid.
     pub fn base_scene(&self) -> Scene {
         let mut scene = self.scene.clone();
         (scene.grid.rows, scene.grid.columns) = (self.image_size, self.image_size);
@@ -141,14 +141,14 @@ impl WakeModelConfig {
         scene
     }
 
-    /// Checks that a scene is one that the model was trained for.
+    /// Checks that a scene is within the model's training ranges.
     ///
-    /// Seed, time, directions, number of looks and the simulation's own accuracy may be any.
+    /// Seed, time, directions, number of looks and the accuracy of the simulation are arbitrary.
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::InvalidOption`] for other numbers of pixels, or with the first value that no training image had, named as in
-    /// a scene file.
+    /// [`wake_nn::Error::InvalidOption`] for another number of pixels, or with the first value outside the training ranges,
+    /// named as in a scene file.
     pub fn check_scene(&self, scene: &Scene) -> Result<()> {
         let (grid, size) = (&scene.grid, self.image_size);
         if [grid.rows, grid.columns] != [size, size] {
@@ -167,7 +167,7 @@ impl WakeModelConfig {
         self.image_size / crate::wake_model::conditioning::PATCH_SIZE
     }
 
-    /// The U-Net, which also sees the maps.
+    /// Configuration of the U-Net, with the maps as further input channels.
     pub(super) fn unet(&self) -> UNetConfig {
         let folded = self.latent_channels * self.fold * self.fold;
         let upward = self.attention.iter().rev().copied().collect();

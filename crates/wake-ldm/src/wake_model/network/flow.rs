@@ -1,4 +1,4 @@
-//! From noise to what mean and spread leave open: the random sea.
+//! Flow from noise to the residual that mean and spread leave open: the random sea.
 
 use burn::module::Module;
 use burn::nn::conv::Conv2d;
@@ -13,16 +13,16 @@ use wake_nn::cast_to;
 use wake_nn::conv::{conv3x3, convolve};
 use wake_nn::patch::{depth_to_space, space_to_depth};
 
-/// The steps that σ = 1 stands for in the embedding of the step.
+/// Number of steps that σ = 1 corresponds to in the embedding of the step.
 const STEPS: f64 = 1000.0;
 
-/// The flow that turns noise n into the residual r of a scene's latents, along x = cos φ r + sin φ n, φ = πσ/2.
+/// Flow that turns noise n into the residual r of a scene's latents, along x = cos φ r + sin φ n, φ = πσ/2.
 ///
-/// The noise is Gaussian, correlated as the sea is (`sea.rs`). Were the residual like it, the velocity would be 0 everywhere: the flow only
-/// has to learn what tells the two apart.
+/// The noise is Gaussian, with the correlation of the sea (`sea.rs`). If the residual had the same distribution, the
+/// velocity would be 0 everywhere: the flow has to learn only the difference between the two.
 ///
-/// The numbers enter every residual block; the places in the ship's frame and
-/// the expected image are laid over the noisy one.
+/// The numbers enter every residual block; the positions in the ship's frame and the expected image are
+/// concatenated to the noisy image.
 ///
 /// # References
 ///
@@ -58,7 +58,7 @@ impl Flow {
         self.maps.weight.val().dtype()
     }
 
-    /// Puts what is known in the form that every step uses.
+    /// Converts the conditioning to the form that every step uses.
     pub fn cached(&self, inputs: &ConditioningInputs) -> CachedConditioning {
         let dtype = self.dtype();
         let maps = Tensor::cat(vec![inputs.places.clone(), inputs.wake.clone()], 1);
@@ -69,7 +69,7 @@ impl Flow {
         }
     }
 
-    /// The velocity ∂x/∂φ = cos φ n − sin φ r, on average over all r and n that make x.
+    /// Predicts the velocity ∂x/∂φ = cos φ n − sin φ r, averaged over all r and n that give x.
     ///
     /// # Shapes
     ///

@@ -1,4 +1,4 @@
-//! What is known of a scene before its sea is drawn: its numbers, places in the ship's frame, and the expected image.
+//! Conditioning on a scene: its numbers, positions in the ship's frame, and the expected image.
 
 use burn::tensor::{Tensor, TensorData};
 use rayon::prelude::*;
@@ -13,21 +13,21 @@ use crate::wake_model::conditioning::{FEATURES, MapGrid, PLACES, features, place
 /// Conditioning of a batch of scenes.
 #[derive(Debug, Clone)]
 pub struct ConditioningInputs {
-    /// Their numbers, `[batch, FEATURES]`.
+    /// Numbers of the scenes, `[batch, FEATURES]`.
     pub numbers: Tensor<2>,
-    /// Places of the latent pixels, `[batch, PLACES, rows, columns]`.
+    /// Position maps of the latent pixels, `[batch, PLACES, rows, columns]`.
     pub places: Tensor<4>,
-    /// Latents of the images expected of them, `[batch, channels, rows, columns]`.
+    /// Latents of the expected images, `[batch, channels, rows, columns]`.
     pub wake: Tensor<4>,
-    /// Logarithms of the deviations that the linear sea has in the channels, `[batch, channels]`.
+    /// Logarithms of the linear sea's standard deviations in the channels, `[batch, channels]`.
     pub log_deviations: Tensor<2>,
 }
 
 impl ConditioningInputs {
     /// Conditioning of scenes at all latent pixels.
     ///
-    /// - `wake`: see [`PhysicsPrior`]; its device is that of the result
-    /// - `log_deviations`: of the channels, see [`PhysicsPrior`], one scene after the other
+    /// - `wake`: see [`PhysicsPrior`]; the result is on the same device
+    /// - `log_deviations`: of the channels, see [`PhysicsPrior`], scene by scene
     pub fn new(scenes: &[Scene], wake: Tensor<4>, log_deviations: &[f32]) -> Self {
         let cells: Vec<Vec<usize>> = scenes
             .iter()
@@ -38,7 +38,7 @@ impl ConditioningInputs {
 
     /// Conditioning of scenes at some latent pixels.
     ///
-    /// - `cells`: which, for each scene
+    /// - `cells`: indices of the pixels of each scene
     /// - `wake`: at these pixels, `[batch, channels, rows, columns]`
     pub fn of_cells(
         scenes: &[Scene],
@@ -61,7 +61,7 @@ impl ConditioningInputs {
         }
     }
 
-    /// All that does not depend on the pixel, `[batch, FEATURES + channels]`.
+    /// All conditioning that does not depend on the pixel, `[batch, FEATURES + channels]`.
     pub(super) fn told(&self) -> Tensor<2> {
         let deviations = self.log_deviations.clone() / LOG_DEVIATION;
         Tensor::cat(vec![self.numbers.clone(), deviations], 1)
@@ -71,24 +71,24 @@ impl ConditioningInputs {
 /// Unit of the logarithms of deviations.
 const LOG_DEVIATION: f64 = 3.0;
 
-/// Side of the image that stands for the mean of an open sea that is the same everywhere [pixels].
+/// Side of the image from which the mean of a uniform open sea is computed [pixels].
 const EVEN: usize = 32;
 
-/// Expected image and deviations of a scene, by physics.
+/// Expected image and standard deviations of a scene, from physics.
 #[derive(Debug, Clone)]
 pub struct PhysicsPrior {
-    /// Grey of [`expected_intensity`], `[rows, columns]` of the scene.
+    /// Grey of the [`expected_intensity`], `[rows, columns]` of the scene.
     pub grey: Vec<f32>,
-    /// Logarithm of the deviation that the [`LinearSea`] has in each channel of the latents.
+    /// Logarithm of the [`LinearSea`]'s standard deviation in each channel of the latents.
     pub log_deviations: Vec<f32>,
 }
 
 impl PhysicsPrior {
-    /// The prior of a scene in the latents of a transform.
+    /// Computes the prior of a scene for the latents of a transform.
     ///
     /// # Errors
     ///
-    /// [`Error::Scene`](crate::Error::Scene) for a scene that is not valid or does not fit in memory.
+    /// [`Error::Scene`](crate::Error::Scene) for a scene that is invalid or does not fit in memory.
     pub fn new(scene: &Scene, scale: &GreyScale, patches: &PatchTransform) -> Result<Self> {
         let grey = expected_grey(scene, scale)?;
         let (sea, windows) = (LinearSea::new(scene)?, ChannelWindows::new(patches));
@@ -100,17 +100,17 @@ impl PhysicsPrior {
     }
 }
 
-/// Change of the grey by the relative intensity where an image has its mean grey.
+/// Derivative of the grey with respect to the relative intensity, at the mean grey of an image.
 pub fn slope_of(grey: &[f32], scale: &GreyScale) -> f64 {
     let mean = grey.iter().map(|&g| f64::from(g)).sum::<f64>() / grey.len().max(1) as f64;
     scale.slope(scale.sigma0(mean))
 }
 
-/// Grey of the image expected of a scene over all its seas, [`expected_intensity`].
+/// Grey of the expected image of a scene, averaged over all seas: [`expected_intensity`].
 ///
 /// # Errors
 ///
-/// [`Error::Scene`](crate::Error::Scene) for a scene that is not valid or does not fit in memory.
+/// [`Error::Scene`](crate::Error::Scene) for a scene that is invalid or does not fit in memory.
 pub fn expected_grey(scene: &Scene, scale: &GreyScale) -> Result<Vec<f32>> {
     scene.validate()?;
     let grey = |power: &f32| scale.grey(f64::from(*power)) as f32;
@@ -124,19 +124,19 @@ pub fn expected_grey(scene: &Scene, scale: &GreyScale) -> Result<Vec<f32>> {
     Ok(expected_intensity(scene)?.values.iter().map(grey).collect())
 }
 
-/// Whether the image expected of a scene is the same everywhere.
+/// Whether the expected image of a scene is uniform.
 fn is_even(scene: &Scene) -> bool {
     scene.ships.is_empty() && !is_drawn(scene)
 }
 
-/// Whether the image expected of a scene depends on its seed: gusts, slicks and the points that echo are drawn.
+/// Whether the expected image of a scene depends on the seed, as with random gusts, slicks and echoing points.
 fn is_drawn(scene: &Scene) -> bool {
     let echoes = scene.ships.iter().any(|ship| ship.echo);
     let sea = &scene.sea;
     echoes || sea.gust_strength > 0.0 || sea.mottle_strength > 0.0 || sea.slick_damping > 0.0
 }
 
-/// [`expected_grey`] of some scenes, on all cores; scenes that follow on their equal are imaged once.
+/// [`expected_grey`] of some scenes, on all cores; equal scenes in succession are imaged once.
 ///
 /// # Errors
 ///
@@ -145,7 +145,7 @@ pub fn expected_greys(scenes: &[Scene], scale: &GreyScale) -> Result<Vec<Vec<f32
     runs_of_equals(scenes, |scene| expected_grey(scene, scale))
 }
 
-/// An image of each scene, all of one size, `[scenes, 1, rows, columns]` on the device of `patches`.
+/// Images of scenes, all of one size, as `[scenes, 1, rows, columns]` on the device of `patches`.
 pub fn images_of(scenes: &[Scene], images: &[Vec<f32>], patches: &PatchTransform) -> Tensor<4> {
     let [rows, columns] = scenes
         .first()
@@ -154,8 +154,9 @@ pub fn images_of(scenes: &[Scene], images: &[Vec<f32>], patches: &PatchTransform
     Tensor::from_data(data, &patches.device())
 }
 
-/// A function of every scene, which depends on the seed for the sake of what is drawn in the expected image alone: found once
-/// for scenes that follow on their equal, for several at once on all cores.
+/// Computes a function of every scene on all cores, once for equal scenes in succession.
+///
+/// Scenes may differ in their seeds if their expected images have no random parts.
 pub(super) fn runs_of_equals<T: Clone + Send>(
     scenes: &[Scene],
     find: impl Fn(&Scene) -> Result<T> + Sync,
@@ -186,7 +187,7 @@ mod tests {
             .unwrap()
     }
 
-    /// Each wake has its own image; that of an open sea is one grey, of the mean of all its pixels.
+    /// Each wake has its own image; the image of an open sea has one grey, the mean of all its pixels.
     #[test]
     fn open_sea_is_even_and_each_wake_its_own() {
         let scale = GreyScale::default();
@@ -201,7 +202,7 @@ mod tests {
         assert!(distance(&images[0], &images[1]) > 0.02);
         let whole = expected_intensity(&calm).unwrap();
         for power in whole.values {
-            // The waves that are averaged over are sampled by the image's own cells: 0.02 dB of brightness, 40 dB of grey.
+            // The waves that are averaged are sampled on the image's own cells: 0.02 dB of brightness, for 40 dB of grey.
             let (grey, even) = (scale.grey(f64::from(power)) as f32, images[2][0]);
             assert!((grey - even).abs() < 5e-4, "{grey} {even}");
         }
@@ -212,7 +213,7 @@ mod tests {
         );
     }
 
-    /// Scenes that differ by their seeds alone are imaged once, but not where gusts, slicks or echoes are drawn.
+    /// Scenes that differ only in their seeds are imaged once, unless they have random gusts, slicks or echoes.
     #[test]
     fn the_seed_counts_where_something_is_drawn() {
         let scale = GreyScale::default();
@@ -230,7 +231,7 @@ mod tests {
                 true,
             ),
             (
-                // A ship in motion is displaced out of so small an image.
+                // A moving ship would be displaced out of such a small image.
                 vec!["ship.echo=true", "ship.speed=0", "radar.range_resolution=6"],
                 true,
             ),

@@ -1,4 +1,4 @@
-//! The small wake model: a linear patch transform, a reader of prompts, mean and spread of the latents, and a flow.
+//! The small wake model: a linear patch transform, a prompt parser, mean and spread of the latents, and a flow.
 
 mod config;
 mod training_ranges;

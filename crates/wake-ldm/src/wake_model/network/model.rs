@@ -1,4 +1,4 @@
-//! The parts of the small wake model.
+//! Parts of the small wake model.
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
@@ -12,7 +12,7 @@ use super::prompt_parser::{PromptParser, windows};
 use crate::wake_model::conditioning::{QUANTITIES, Vocabulary, said, tokens};
 use wake_text::PartialScene;
 
-/// A latent diffusion model of radar images of wakes.
+/// Latent diffusion model of radar images of wakes.
 ///
 /// ```text
 /// words ─► parser ─► numbers ─► physics: expected image ─► patches: w ─┐
@@ -22,7 +22,7 @@ use wake_text::PartialScene;
 /// ```
 #[derive(Module, Debug)]
 pub struct WakeModel {
-    /// Squares of pixels as latents.
+    /// Squares of pixels to latents and back.
     pub patches: PatchTransform,
     /// Words to numbers.
     pub parser: PromptParser,
@@ -33,7 +33,7 @@ pub struct WakeModel {
 }
 
 impl WakeModelConfig {
-    /// A model with random weights, and patches that still have to be fitted or loaded.
+    /// Makes a model with random weights, and with patches that must be fitted or loaded.
     ///
     /// # Panics
     ///
@@ -47,7 +47,7 @@ impl WakeModelConfig {
         }
     }
 
-    /// A parser with random weights.
+    /// Makes a parser with random weights.
     ///
     /// # Panics
     ///
@@ -57,7 +57,7 @@ impl WakeModelConfig {
         PromptParser::new(self, device)
     }
 
-    /// A prior with random weights.
+    /// Makes a prior with random weights.
     ///
     /// # Panics
     ///
@@ -67,7 +67,7 @@ impl WakeModelConfig {
         Prior::new(self, device)
     }
 
-    /// A flow with random weights.
+    /// Makes a flow with random weights.
     ///
     /// # Panics
     ///
@@ -85,7 +85,7 @@ impl WakeModelConfig {
 }
 
 impl WakeModel {
-    /// The numbers that prompts state, as far as the parser finds them.
+    /// Reads the numbers that prompts state, as far as the parser finds them.
     pub fn read(
         &self,
         prompts: &[&str],
@@ -99,12 +99,12 @@ impl WakeModel {
         numbers.chunks(3 * QUANTITIES).map(said).collect()
     }
 
-    /// The image of latents, grey 0…1, `[batch, 1, rows, columns]`.
+    /// Decodes latents to images, grey 0…1, `[batch, 1, rows, columns]`.
     ///
-    /// What the latents have beyond those of the image that is expected is added to that image, so that its finest details,
-    /// which no latents hold, stay.
+    /// The difference between the latents and those of the expected image is decoded and added to that image, so that its
+    /// finest details, which the latents do not hold, are kept.
     ///
-    /// - `image`: the expected one, of the result's shape, and `known` what was made of it
+    /// - `image`: the expected image, with the shape of the result, from which `inputs` were computed
     pub fn decode(
         &self,
         latents: Tensor<4>,

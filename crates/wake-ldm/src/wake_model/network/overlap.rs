@@ -1,4 +1,4 @@
-//! Squares that overlap: an orthogonal filter across their borders.
+//! Overlapping squares: an orthogonal filter across their borders.
 
 use std::f64::consts::{PI, SQRT_2};
 
@@ -10,20 +10,19 @@ use wake_nn::patch::{depth_to_space, space_to_depth};
 
 /// Pixels on each side of a border that are filtered.
 pub(super) const REACH: usize = PATCH_SIZE / 2;
-/// Pixels of a square.
+/// Number of pixels of a square.
 pub(super) const PIXELS: usize = PATCH_SIZE * PATCH_SIZE;
 
-/// Filters images across the borders of their squares, so that what a square holds afterwards reaches into its neighbours.
+/// Filters images across the borders of their squares, so that the content of a filtered square reaches into its neighbours.
 ///
 /// ```text
 /// a + b stays,    b − a becomes V (b − a),    V = C₂ᵀ C₄
 /// ```
 ///
-/// - a, b: the four pixels before a border, and their mirror images behind it, the farthest first; along rows and along
-///   columns
+/// - a, b: the four pixels before a border, and their mirror images behind it, farthest first; along rows and along columns
 /// - C₂, C₄: cosine transforms of four numbers, types II and IV
 ///
-/// The filter is orthogonal and keeps a constant. At the edge of an image b is a: nothing changes there.
+/// The filter is orthogonal and preserves constants. At the edge of an image b equals a, so nothing changes there.
 ///
 /// # Shapes
 ///
@@ -42,7 +41,7 @@ pub(super) fn after_decoding(images: Tensor<4>) -> Tensor<4> {
     filtered(images, |i, j| [j, i])
 }
 
-/// Applies the filter or, with its indices turned round, its inverse.
+/// Applies the filter or, with swapped indices, its inverse.
 fn filtered(images: Tensor<4>, index: impl Fn(usize, usize) -> [usize; 2]) -> Tensor<4> {
     let [batch, _, rows, columns] = images.dims();
     let line = across_a_border();
@@ -67,7 +66,7 @@ fn filtered(images: Tensor<4>, index: impl Fn(usize, usize) -> [usize; 2]) -> Te
         .narrow(3, REACH, columns)
 }
 
-/// Images with the mirror image of four pixels more at both ends of a dimension.
+/// Extends images by the mirror image of four pixels at both ends of a dimension.
 fn mirrored(images: Tensor<4>, dimension: usize) -> Tensor<4> {
     let length = images.dims()[dimension];
     let mirror = |start| {
@@ -80,7 +79,7 @@ fn mirrored(images: Tensor<4>, dimension: usize) -> Tensor<4> {
     Tensor::cat(vec![first, images, last], dimension)
 }
 
-/// The filter of the eight pixels about a border, in their order.
+/// Filter of the eight pixels about a border, in their order.
 fn across_a_border() -> [[f64; PATCH_SIZE]; PATCH_SIZE] {
     let n = REACH as f64;
     let second = |k: usize, i: usize| {
@@ -136,13 +135,13 @@ mod tests {
         assert!(largest(before_encoding(flat.clone()) - flat) < 1e-6);
     }
 
-    /// Formula and order as they are written, pixel by pixel.
+    /// The filter follows its formula and order, pixel by pixel.
     #[test]
     fn differences_across_a_border_are_turned() {
         let x = image(8, 16);
         let of = |x: &Tensor<4>| -> Vec<f64> { x.to_data().iter::<f64>().collect() };
         let (x, y) = (of(&x), of(&before_encoding(x)));
-        // One row of squares: nothing changes along columns.
+        // There is one row of squares, so nothing changes along columns.
         let cosine = |k: f64, i: f64| 0.5f64.sqrt() * (PI * k * (i + 0.5) / 4.0).cos();
         for row in 0..8 {
             let (x, y) = (&x[16 * row..][..16], &y[16 * row..][..16]);

@@ -1,16 +1,17 @@
-//! The parts of the wake model by name.
+//! Parts of the wake model by name.
 
-/// A part of a [`WakeModel`](super::WakeModel): one of its fields, the file of its weights, and the stage of training that
-/// makes it all have this name.
+/// Part of a [`WakeModel`](super::WakeModel).
+///
+/// Its field, the file of its weights and the training stage that makes it all have its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
     /// The linear autoencoder, [`PatchTransform`](super::PatchTransform), fitted in closed form.
     Patches,
-    /// The reader of prompts, [`PromptParser`](super::PromptParser).
+    /// The prompt parser, [`PromptParser`](super::PromptParser).
     Parser,
     /// Mean and standard deviation of the latents, [`Prior`](super::Prior).
     Prior,
-    /// The flow that draws the sea, [`Flow`](super::Flow).
+    /// The flow that samples the sea, [`Flow`](super::Flow).
     Flow,
 }
 
@@ -18,7 +19,7 @@ impl Part {
     /// All parts, in the order in which they are trained.
     pub const ALL: [Self; 4] = [Self::Patches, Self::Parser, Self::Prior, Self::Flow];
 
-    /// Its name, such as `prior`.
+    /// Name of the part, such as `prior`.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -29,7 +30,7 @@ impl Part {
         }
     }
 
-    /// The file of its weights in the folder of a model, such as `prior.safetensors`.
+    /// File name of the weights in the folder of a model, such as `prior.safetensors`.
     #[must_use]
     pub const fn file(self) -> &'static str {
         match self {

@@ -1,4 +1,4 @@
-//! The autoencoder in closed form: squares of pixels that overlap as a few whitened principal components.
+//! Autoencoder in closed form: overlapping squares of pixels as a few whitened principal components.
 
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData};
@@ -7,20 +7,20 @@ use super::overlap::{self, PIXELS, REACH};
 use crate::wake_model::conditioning::PATCH_SIZE;
 use wake_nn::patch::{depth_to_space, space_to_depth};
 
-/// Rows and columns of pixels that one square of latents reaches.
+/// Rows and columns of pixels covered by one latent pixel.
 pub(super) const WINDOW: usize = PATCH_SIZE + 2 * REACH;
 
-/// A linear map between squares of 8 × 8 pixels that overlap and a few numbers, both ways.
+/// Linear map between overlapping squares of 8 × 8 pixels and a few numbers, in both directions.
 ///
 /// ```text
 /// z = W p,    p ≈ V z,    W = Λ^(−1/2) Eᵀ,  V = E Λ^(1/2)
 /// ```
 ///
-/// - p: a square of the grey of an image whose mean has been taken away, after an orthogonal filter across the borders of
-///   squares (`overlap.rs`): each p is of 16 × 16 pixels, so that what is left out of it, or drawn wrongly, makes no edge
+/// - p: a square of the grey of an image minus its mean, after an orthogonal filter across the borders of squares
+///   (`overlap.rs`): each p depends on 16 × 16 pixels, so that omitted or wrong components leave no edges
 /// - E, Λ: the first principal components of such squares and their variances
 ///
-/// Each z has variance 1 over the data. No other map of so many numbers that is linear in p loses less.
+/// Each z has variance 1 over the data. No other linear map of p to as many numbers loses less.
 ///
 /// # References
 ///
@@ -32,15 +32,15 @@ pub struct PatchTransform {
     synthesis: Param<Tensor<2>>,
 }
 
-/// Share of the variance of each principal component.
+/// Variance explained by each principal component.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExplainedVariance {
-    /// Variances in grey², the largest first.
+    /// Variances in grey², in descending order.
     pub variances: Vec<f64>,
 }
 
 impl ExplainedVariance {
-    /// Share of the variance that the first `channels` hold.
+    /// Fraction of the variance in the first `channels`.
     pub fn kept(&self, channels: usize) -> f64 {
         let total: f64 = self.variances.iter().sum();
         self.variances.iter().take(channels).sum::<f64>() / total
@@ -58,7 +58,7 @@ impl ExplainedVariance {
 }
 
 impl PatchTransform {
-    /// A transform that still has to be fitted or loaded.
+    /// Makes a transform that must be fitted or loaded.
     pub fn zeros(channels: usize, device: &Device) -> Self {
         Self {
             analysis: Param::from_tensor(Tensor::zeros([channels, PIXELS], device)),
@@ -66,7 +66,7 @@ impl PatchTransform {
         }
     }
 
-    /// The transform of some images, fitted in closed form.
+    /// Fits the transform to some images in closed form.
     ///
     /// - `images`: grey, each `size × size` pixels, in rows; `size` is a multiple of 8
     pub fn fit<'a>(
@@ -100,12 +100,12 @@ impl PatchTransform {
         (transform, ExplainedVariance { variances: values })
     }
 
-    /// Where the transform lies.
+    /// Device of the transform.
     pub(super) fn device(&self) -> Device {
         self.analysis.val().device()
     }
 
-    /// Weights of each channel for the pixels of a square and of half its neighbours, `[channels, 16 × 16]` in rows.
+    /// Weights of each channel for the pixels of a square and half of its neighbours, `[channels, 16 × 16]` in rows.
     pub fn windows(&self) -> Vec<f32> {
         let analysis = self.analysis.val();
         let [channels, _] = analysis.dims();
@@ -148,7 +148,7 @@ impl PatchTransform {
     }
 }
 
-/// A matrix applied to the channels of every pixel.
+/// Applies a matrix to the channels of every pixel.
 fn mix(matrix: Tensor<2>, image: Tensor<4>) -> Tensor<4> {
     let [batch, channels, rows, columns] = image.dims();
     let [out, _] = matrix.dims();
@@ -159,7 +159,7 @@ fn mix(matrix: Tensor<2>, image: Tensor<4>) -> Tensor<4> {
         .reshape([batch, out, rows, columns])
 }
 
-/// Covariance of the squares of images whose means have been taken away.
+/// Covariance of the squares of images minus their means.
 fn covariance(images: impl Iterator<Item = Vec<f32>>, size: usize) -> Vec<Vec<f64>> {
     let mut sums = vec![vec![0.0; PIXELS]; PIXELS];
     let mut count = 0.0;
@@ -185,7 +185,7 @@ fn covariance(images: impl Iterator<Item = Vec<f32>>, size: usize) -> Vec<Vec<f6
     sums
 }
 
-/// Eigenvalues of a symmetric matrix, the largest first, and its eigenvectors as columns, by Jacobi's rotations.
+/// Eigenvalues of a symmetric matrix in descending order, and its eigenvectors as columns, by Jacobi rotations.
 ///
 /// # References
 ///
@@ -218,7 +218,7 @@ fn symmetric_eigen(mut a: Vec<Vec<f64>>) -> (Vec<f64>, Vec<Vec<f64>>) {
     (values, vectors)
 }
 
-/// Makes a[p][q] zero.
+/// Makes `a[p][q]` zero by a rotation.
 fn rotate(a: &mut [Vec<f64>], vectors: &mut [Vec<f64>], p: usize, q: usize) {
     if a[p][q].abs() < 1e-300 {
         return;
@@ -243,7 +243,7 @@ mod tests {
     use wake_physics::Field;
     use wake_physics::reference::seams;
 
-    /// Waves of two directions: two components hold almost all of it.
+    /// Waves of two directions, almost all of whose variance is in two components.
     fn images() -> Vec<Vec<f32>> {
         let wave = |k: [f64; 2], phase: f64| -> Vec<f32> {
             (0..64 * 64)
@@ -284,7 +284,7 @@ mod tests {
                 .square()
                 .mean();
             let psnr = -10.0 * f64::from(lost.into_scalar::<f32>()).log10();
-            // Two components leave 60 dB and more, far above the rounding of f32 at 150 dB.
+            // Two components give a PSNR of 60 dB and more, far from the rounding of f32 at 150 dB.
             assert!(
                 (psnr - shares.psnr(channels)).abs() < 0.01,
                 "{psnr} {shares:?}"
@@ -314,12 +314,12 @@ mod tests {
             };
             let sum: f32 = window.iter().enumerate().map(|(n, w)| w * pixel(n)).sum();
             let encoded = latents[(c * 8 + row) * 8 + column];
-            // Latents are of order 1, sums of 256 products in f32.
+            // Latents are of order 1, and sums of 256 products in f32.
             assert!((sum - encoded).abs() < 1e-4, "{c}: {sum} {encoded}");
         }
     }
 
-    /// Latents that know nothing of their neighbours: squares that touch would have edges of some 90 times the differences inside.
+    /// Latents that are independent of their neighbours: without overlap, edges would be some 90 times the differences inside.
     #[test]
     fn squares_of_random_latents_have_no_edges() {
         let device = Device::flex();

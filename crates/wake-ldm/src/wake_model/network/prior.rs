@@ -1,4 +1,4 @@
-//! Mean and spread of the latents of a scene, from its numbers and the image expected of it.
+//! Mean and spread of the latents of a scene, from its numbers and the expected image.
 
 use burn::module::Module;
 use burn::nn::conv::Conv2d;
@@ -14,23 +14,23 @@ use wake_nn::conv::{conv1x1, convolve};
 
 /// Largest |c|.
 const LARGEST_LOG_STD: f64 = 3.0;
-/// Layers after the first.
+/// Number of layers after the first.
 const LAYERS: usize = 3;
-/// Width of the network of the mean grey.
+/// Width of the network for the mean grey.
 const GREY_WIDTH: usize = 128;
 
-/// Mean and spread of the latents of a scene, over all seas that it can have.
+/// Mean and spread of the latents of a scene, over all its possible seas.
 ///
 /// ```text
 /// mean μ = (1 + a) w + d m,    spread s = d e^c
 /// ```
 ///
-/// - w: latents of the image that physics expects; d: deviation of the linear sea in the channel, see
+/// - w: latents of the expected image from physics; d: standard deviation of the linear sea in the channel, see
 ///   [`PhysicsPrior`](super::PhysicsPrior)
-/// - a, m, c: of a network that sees one latent pixel, its place in the ship's frame and the numbers: what the formulas of
-///   w and d neglect
+/// - a, m, c: from a network of one latent pixel, its position in the ship's frame and the numbers, which corrects for what
+///   the formulas of w and d neglect
 ///
-/// What is left, (z − μ)/s, has mean 0 and variance 1 at every pixel; the flow draws it.
+/// The residual (z − μ)/s has mean 0 and variance 1 at every pixel; it is sampled by the flow.
 ///
 /// # References
 ///
@@ -50,14 +50,14 @@ pub struct Prior {
     grey_out: Linear,
 }
 
-/// Mean and spread that a [`Prior`] gives for a batch.
+/// Mean and spread from a [`Prior`] for a batch.
 #[derive(Debug, Clone)]
 pub struct Expected {
     /// μ, `[batch, channels, rows, columns]`.
     pub mean: Tensor<4>,
     /// ln s, `[batch, channels, rows, columns]`.
     pub log_std: Tensor<4>,
-    /// Mean grey of each image less that of the expected one, `[batch, 1]`.
+    /// Mean grey of each image minus that of the expected one, `[batch, 1]`.
     pub grey: Tensor<2>,
 }
 
@@ -80,7 +80,7 @@ impl Prior {
         }
     }
 
-    /// Mean, spread and brightness at the latent pixels of `known`, of its type.
+    /// Mean, spread and brightness at the latent pixels of `inputs`, with its number type.
     pub fn forward(&self, inputs: &ConditioningInputs) -> Expected {
         let (dtype, wide) = (self.mean.weight.val().dtype(), inputs.wake.dtype());
         let numbers = cast_to(inputs.told(), dtype);
@@ -113,12 +113,12 @@ impl Prior {
 }
 
 impl Expected {
-    /// Residual, which the flow draws: (z − μ)/s.
+    /// Residual (z − μ)/s, which the flow samples.
     pub fn residual(&self, latents: Tensor<4>) -> Tensor<4> {
         (latents - self.mean.clone()) * self.log_std.clone().neg().exp()
     }
 
-    /// The latents z = μ + s r of a residual r.
+    /// Latents z = μ + s r of a residual r.
     pub fn latents(&self, residual: Tensor<4>) -> Tensor<4> {
         residual * self.log_std.clone().exp() + self.mean.clone()
     }

@@ -1,4 +1,4 @@
-//! From words to the numbers they state.
+//! Parser of prompts, from words to the numbers they state.
 
 use burn::module::{Module, Param};
 use burn::nn::{Embedding, EmbeddingConfig, Initializer, Linear, LinearConfig};
@@ -10,14 +10,14 @@ use crate::wake_model::conditioning::{QUANTITIES, Vocabulary};
 use wake_nn::attention::CrossAttention;
 use wake_nn::cast_to;
 
-/// Tokens on each side that a token sees at once.
+/// Number of neighbouring tokens on each side in a token's window.
 const REACH: usize = 6;
-/// Tokens that a token sees at once, itself included.
+/// Number of tokens in a window, including the token itself.
 const WINDOW: usize = 2 * REACH + 1;
-/// Attention heads.
+/// Number of attention heads.
 const HEADS: usize = 2;
 
-/// A small transformer that reads what a prompt states.
+/// Small transformer that reads the values stated by a prompt.
 ///
 /// ```text
 /// h_i = MLP(E(w_{i−6}), …, E(w_{i+6}))          a token with its neighbours: digits, unit, the word before
@@ -25,7 +25,7 @@ const HEADS: usize = 2;
 /// [stated, a, b]_q = MLP(v_q)                   as in `conditioning::statement`
 /// ```
 ///
-/// The window sees whole numbers with their units, so attention only has to find the right one.
+/// The window covers whole numbers with their units, so attention has to find only the right one.
 ///
 /// # References
 ///
@@ -61,11 +61,11 @@ impl PromptParser {
         }
     }
 
-    /// Values that prompts state, as [`statement`](crate::wake_model::conditioning::statement), in 32 bits.
+    /// Reads the values that prompts state, as [`statement`](crate::wake_model::conditioning::statement), in f32.
     ///
     /// # Shapes
     ///
-    /// `windows`: as [`windows`] gives them; result `[batch, 3 · QUANTITIES]`.
+    /// `windows`: from [`windows`]; result `[batch, 3 · QUANTITIES]`.
     pub fn forward(&self, windows: Tensor<2, Int>, tokens: usize) -> Tensor<2> {
         let batch = windows.dims()[0] / tokens;
         let seen = self.embedding.forward(windows);
@@ -79,7 +79,7 @@ impl PromptParser {
     }
 }
 
-/// Each token of some prompts with its neighbours, as compact ids; beyond the ends there is the unknown token.
+/// Windows of the tokens of some prompts as compact ids; beyond the ends they hold the unknown token.
 ///
 /// # Shapes
 ///

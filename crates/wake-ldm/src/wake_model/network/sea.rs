@@ -1,4 +1,4 @@
-//! The noise that a flow starts from: seas to first order.
+//! Initial noise of a flow: seas to first order.
 
 use burn::tensor::{Tensor, TensorData};
 use rayon::prelude::*;
@@ -11,21 +11,21 @@ use crate::error::Result;
 use crate::streams::{INITIAL_STREAM, WHITE_STREAM};
 use wake_nn::noise::{NoiseSource, normal_batch};
 
-/// Share of the noise that is white in every channel: what the image has beyond the first order needs some to start from.
+/// White share of the noise in every channel, from which components beyond the first order can start.
 const WHITE: f64 = 0.05;
 
-/// Gaussian noise in the latents of a scene, of variance 1 in every channel, correlated as its sea is.
+/// Gaussian noise in the latents of a scene, with variance 1 in every channel and the correlation of its sea.
 ///
 /// ```text
 /// n = √(1 − ε) f/√(var f) + √ε g
 /// ```
 ///
 /// - f: latents of a [`LinearSea`] of the scene, with their variance in each channel
-/// - g: white noise; alone where the sea has no waves
+/// - g: white noise; the only term if the sea has no waves
 ///
 /// # References
 ///
-/// Lee et al. (2022), "`PriorGrad`", section 3 (noise with the variance that the data have); Kollovieh et al. (2024), "Flow
+/// Lee et al. (2022), "`PriorGrad`", section 3 (noise with the variance of the data); Kollovieh et al. (2024), "Flow
 /// Matching with Gaussian Process Priors for Probabilistic Time Series Forecasting".
 #[derive(Debug, Clone)]
 struct SeaNoise {
@@ -37,11 +37,11 @@ struct SeaNoise {
 }
 
 impl SeaNoise {
-    /// The noise of a scene, with or without its ship.
+    /// Noise of a scene, with or without its ship.
     ///
     /// # Errors
     ///
-    /// [`Error::Scene`](crate::Error::Scene) for a scene that is not valid or does not fit in memory.
+    /// [`Error::Scene`](crate::Error::Scene) for a scene that is invalid or does not fit in memory.
     fn new(scene: &Scene, channels: &ChannelWindows) -> Result<Self> {
         let sea = LinearSea::new(scene)?;
         let share = |variance: f64| match variance {
@@ -56,7 +56,7 @@ impl SeaNoise {
         })
     }
 
-    /// The sea of a source, `[rows, columns]` of the scene.
+    /// Sea of a source, `[rows, columns]` of the scene.
     fn field(&self, source: NoiseSource) -> Vec<f32> {
         let normals = source.normal(INITIAL_STREAM, self.sea.normals());
         self.sea.field(&normals).values
@@ -71,11 +71,11 @@ pub struct SeaFields {
 }
 
 impl SeaFields {
-    /// Spectra of scenes of one size, on all cores; equal scenes in succession are computed once.
+    /// Draws the seas of scenes of one size, on all cores; the spectrum of equal scenes in succession is computed once.
     ///
     /// # Errors
     ///
-    /// [`Error::Scene`](crate::Error::Scene) for a scene that is not valid or does not fit in memory.
+    /// [`Error::Scene`](crate::Error::Scene) for a scene that is invalid or does not fit in memory.
     pub fn new(
         scenes: &[Scene],
         sources: &[NoiseSource],
@@ -87,9 +87,9 @@ impl SeaFields {
         Ok(Self { seas, fields })
     }
 
-    /// What [`PhysicsPrior::log_deviations`](super::PhysicsPrior::log_deviations) is of each scene, one after the other.
+    /// [`PhysicsPrior::log_deviations`](super::PhysicsPrior::log_deviations) of each scene, scene by scene.
     ///
-    /// - `slopes`: change of the grey by the relative intensity, of each scene
+    /// - `slopes`: derivative of the grey with respect to the relative intensity, for each scene
     pub fn log_deviations(&self, channels: &ChannelWindows, slopes: &[f64]) -> Vec<f32> {
         let scenes = self.seas.iter().zip(slopes);
         scenes
@@ -97,7 +97,7 @@ impl SeaFields {
             .collect()
     }
 
-    /// The noise in latents.
+    /// Encodes the seas and adds white noise, which gives the noise in latents.
     ///
     /// # Shapes
     ///
@@ -138,7 +138,7 @@ mod tests {
         scene
     }
 
-    /// Grey of simulated open sea.
+    /// Grey of a simulated open sea.
     fn grey(scene: &Scene) -> Vec<f32> {
         let scale = GreyScale::default();
         let values = simulate(scene).unwrap().intensity.values;
@@ -177,7 +177,7 @@ mod tests {
         }
         for sum in sums {
             let variance = sum / (draws * 256) as f64;
-            // 10,240 numbers, correlated over a few: half a thousand independent ones at least, so 6 % each way, 4 times.
+            // 10,240 numbers with short correlations: at least 500 independent ones, so 6 % of error, times 4.
             assert!((variance - 1.0).abs() < 0.25, "{variance}");
         }
         let again = sea_noise(
@@ -190,8 +190,7 @@ mod tests {
         assert_eq!(numbers(second), numbers(one));
     }
 
-    /// Covariances of channels 0…5 of a latent pixel with those of the pixels to its right, below it, and below to its right,
-    /// over their deviations.
+    /// Correlations of channels 0…5 of a latent pixel with those of the pixels to its right, below it, and below to its right.
     fn correlations(images: &[Vec<f32>]) -> Vec<f64> {
         let at = |z: &[f32], c: usize, i: usize, j: usize| f64::from(z[(c * 16 + i) * 16 + j]);
         let mut all = Vec::new();
@@ -212,8 +211,8 @@ mod tests {
         all
     }
 
-    /// Neighbouring latents of the noise have the correlations of the linear sea but for the white share, and much the same
-    /// pattern as those of the simulator's sea.
+    /// Neighbouring latents of the noise have the correlations of the linear sea except for the white share, and nearly the
+    /// same pattern as those of the simulator's sea.
     #[test]
     fn noise_is_correlated_as_the_sea_is() {
         const SEAS: u64 = 48;
@@ -243,7 +242,7 @@ mod tests {
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
         let likeness = |a: &[f64], b: &[f64]| dot(a, b) / (dot(a, a) * dot(b, b)).sqrt();
         let slope = dot(&linear, &drawn) / dot(&linear, &linear);
-        // Correlations of 0.09 in the root mean square, of 10,800 pairs of latents: 0.012 of chance in each.
+        // Correlations have a root mean square of 0.09; 10,800 pairs of latents give a standard error of 0.012 each.
         assert!((slope - (1.0 - WHITE)).abs() < 0.04, "{slope}");
         let [same, other] = [&drawn, &turned].map(|seas| likeness(&simulated, seas));
         assert!(same > 0.85 && other < 0.6, "{same} {other}");

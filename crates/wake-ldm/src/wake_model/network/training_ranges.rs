@@ -1,4 +1,4 @@
-//! Which scenes a model was trained for.
+//! Ranges of the scenes that a model was trained on.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use wake_physics::Scene;
 
 use crate::error::{Error, Result};
 
-/// Keys that may have any value: chance, time, directions, speckle, accuracy, and the name of what the other keys say.
+/// Keys that may have any value: seed, time, directions, speckle, accuracy, and the sensor, whose values have other keys.
 const ANY: [&str; 9] = [
     "seed",
     "sea.time",
@@ -20,26 +20,26 @@ const ANY: [&str; 9] = [
     "radar.sensor",
     "grid.oversampling",
 ];
-/// A table of such keys.
+/// Prefix of further keys of this kind.
 const ANY_OF: &str = "model.";
-/// Ships of a scene.
+/// Key for the number of ships of a scene.
 const SHIPS: &str = "ships";
-/// Share of a range that a number may lie beyond it: the ends of what was drawn were not all drawn.
+/// Fraction of a range by which a number may exceed it, because the ends of the sampled range were not all sampled.
 const BEYOND: f64 = 0.02;
 
-/// The values that the scenes of a training set have, key by key: numbers from the smallest to the largest, of all else each.
+/// Values of the scenes of a training set by key: the smallest and largest number, and all other values.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct TrainingRanges(BTreeMap<String, Seen>);
 
-/// The values of one key.
+/// Values of one key.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Seen {
-    /// The smallest number and the largest.
+    /// Smallest and largest number.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     range: Option<[f64; 2]>,
-    /// Words, flags, and `null` for a key that some scenes lack.
+    /// Strings, booleans, and `null` for a key that some scenes lack.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     values: Vec<Value>,
 }
@@ -60,12 +60,13 @@ impl TrainingRanges {
         Ok(ranges)
     }
 
-    /// Checks that a scene has only values that were seen; a ranges of no scene holds every scene. Keys that scenes did not have when
-    /// these were seen must have their default.
+    /// Checks that a scene is within the ranges; empty ranges contain every scene.
+    ///
+    /// Keys that are missing in the ranges must have their default.
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::InvalidOption`] with the first one that was not, named as in a scene file.
+    /// [`wake_nn::Error::InvalidOption`] with the first value outside the ranges, named as in a scene file.
     pub fn check(&self, scene: &Scene) -> Result<()> {
         if self.0.is_empty() {
             return Ok(());
@@ -130,7 +131,7 @@ impl std::fmt::Display for Seen {
     }
 }
 
-/// All values of a scene by their keys; those of every ship under the same ones. An infinite depth is a word.
+/// All values of a scene by key, with the same keys for every ship. An infinite depth is a string.
 fn leaves(scene: &Scene) -> Result<Vec<(String, Value)>> {
     let json = |source| {
         Error::Model(wake_nn::Error::Json {
@@ -168,7 +169,7 @@ fn walk(name: &str, value: &Value, found: &mut Vec<(String, Value)>) {
                 walk(&name, value, found);
             }
         }
-        // Places are looked at axis by axis; no two of a scene's lists are of other things.
+        // Positions are read axis by axis; all lists of a scene hold values of one kind.
         Value::Array(list) => list.iter().for_each(|value| walk(name, value, found)),
         value => found.push((name.to_owned(), value.clone())),
     }

@@ -1,24 +1,24 @@
-//! How much of a sea each channel of the latents sees.
+//! Variance of a sea in each channel of the latents.
 
 use rayon::prelude::*;
 use wake_physics::LinearSea;
 
 use super::patches::{PatchTransform, WINDOW};
 
-/// Distances of two pixels of a window along rows or columns.
+/// Number of distances between two pixels of a window along rows or columns.
 const LAGS: usize = 2 * WINDOW - 1;
-/// The distance 0 among those of rows and columns.
+/// Index of distance 0 among those along rows and columns.
 const NONE: usize = LAGS * LAGS / 2;
-/// A channel has at least this share of the variance that it would have of a white field.
+/// Smallest variance of a channel, as a share of its variance for a white field.
 const LEAST_SHARE: f64 = 1e-5;
-/// Deviation of white grey that every sea has at least: a twenty-fifth of a decibel on the default scale, far below any
+/// Smallest standard deviation of white grey of any sea: a twenty-fifth of a decibel on the default scale, far below any
 /// speckle (chosen).
 const LEAST_GREY: f64 = 1e-3;
 
-/// Weights of the latent channels for pixels, as far as variances need them.
+/// Weights of the latent channels for pixels, in the form needed for variances.
 #[derive(Debug, Clone)]
 pub struct ChannelWindows {
-    /// Sums of w(p) w(p + d) over all pixels p of a window, by the distance d in rows and columns; of each channel.
+    /// Sums of w(p) w(p + d) over all pixels p of a window, for each channel and each distance d in rows and columns.
     correlations: Vec<Vec<f64>>,
 }
 
@@ -43,7 +43,7 @@ impl ChannelWindows {
         }
     }
 
-    /// Variance of each channel on a sea: Σ C(d) Σ w(p) w(p + d) with C the covariance of two pixels; 0 where there are no waves.
+    /// Variance of each channel for a sea: Σ C(d) Σ w(p) w(p + d), with C the covariance of two pixels; 0 without waves.
     pub(super) fn variances(&self, sea: &LinearSea) -> Vec<f64> {
         let covariance = sea.covariance();
         let wrapped = |lag: usize, n: usize| (lag + WINDOW * n - (WINDOW - 1)) % n;
@@ -58,14 +58,14 @@ impl ChannelWindows {
         self.correlations.iter().map(of_channel).collect()
     }
 
-    /// Logarithm of the deviation of each channel of the grey of a sea.
+    /// Logarithm of the standard deviation of a sea's grey in each channel.
     ///
-    /// - `slope`: change of the grey by the relative intensity
+    /// - `slope`: derivative of the grey with respect to the relative intensity
     pub(super) fn log_deviations(&self, sea: &LinearSea, slope: f64) -> Vec<f32> {
         self.of_variances(&self.variances(sea), slope)
     }
 
-    /// The same by the variances of the relative intensity.
+    /// As `log_deviations`, from the variances of the relative intensity.
     pub(super) fn of_variances(&self, variances: &[f64], slope: f64) -> Vec<f32> {
         let channels = variances.iter().zip(&self.correlations);
         let of = |(variance, sums): (&f64, &Vec<f64>)| {

@@ -1,4 +1,4 @@
-//! An image as a radar would deliver it, with what is known about it.
+//! A generated image as a radar would deliver it, with its scene and labels.
 
 use wake_physics::grey::GreyScale;
 use wake_physics::labels::Labels;
@@ -6,45 +6,45 @@ use wake_physics::{Field, Scene, labels_of, unit_speckle};
 
 use crate::error::Result;
 
-/// Seconds of the stages of one call, for all images of its batch together.
+/// Time in seconds of the stages of one call, for all images of its batch together.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SampleSeconds {
-    /// Words to numbers.
+    /// From words to numbers.
     pub text: f64,
-    /// Numbers to the mean and spread of the latents, and to the noise.
+    /// From numbers to the mean and spread of the latents, and to the noise.
     pub expect: f64,
-    /// Steps from noise to latents.
+    /// From noise to latents, over all steps.
     pub denoise: f64,
-    /// Latents to grey.
+    /// From latents to grey.
     pub decode: f64,
-    /// The four together; labels and speckle are not in it.
+    /// Sum of the four; labels and speckle are not included.
     pub total: f64,
 }
 
-/// A generated image. Fields are `[rows, columns]`.
+/// Generated image with its scene and labels. Fields are `[rows, columns]`.
 #[derive(Debug, Clone)]
 pub struct WakeImage {
-    /// Grey 0…1 as the model draws it: without speckle, but with that of a learnt sea.
+    /// Grey 0…1 from the model, without speckle except that of a learnt sea.
     pub grey: Field,
-    /// Intensity of the same, linear, in the unit of σ⁰.
+    /// Linear intensity of the same image, in the unit of σ⁰.
     pub intensity: Field,
-    /// Intensity with speckle: times [`unit_speckle`], or of the learnt sea, which gets no second one.
+    /// Intensity with speckle: multiplied by [`unit_speckle`], except for a learnt sea, which already has its own.
     pub speckled: Field,
     /// Labels of [`scene`](Self::scene).
     pub labels: Labels,
     /// The scene of the image: the given values, and defaults for those left open.
     pub scene: Scene,
-    /// The mapping between intensity and grey.
+    /// Mapping between intensity and grey.
     pub scale: GreyScale,
-    /// Seconds by stage.
+    /// Time in seconds by stage.
     pub seconds: SampleSeconds,
 }
 
-/// An intensity times the speckle of its scene's radar.
+/// Multiplies an intensity by the speckle of its scene's radar.
 ///
 /// # Errors
 ///
-/// [`Error::Scene`](crate::Error::Scene) for a scene that is not valid.
+/// [`Error::Scene`](crate::Error::Scene) for an invalid scene.
 pub fn speckled(intensity: &Field, scene: &Scene) -> Result<Field> {
     let mut speckled = unit_speckle(scene)?;
     let pixels = speckled.values.iter_mut().zip(&intensity.values);
@@ -78,7 +78,7 @@ impl WakeImage {
         })
     }
 
-    /// An image whose intensity has its speckle already.
+    /// Makes an image from an intensity that already has speckle.
     pub(super) fn with_speckle(
         intensity: Field,
         scale: GreyScale,
@@ -100,7 +100,7 @@ impl WakeImage {
         }
     }
 
-    /// The speckled image as 8-bit levels of grey, row after row.
+    /// Speckled image as 8-bit grey levels, row by row.
     pub fn levels(&self) -> Vec<u8> {
         self.speckled
             .values

@@ -1,4 +1,4 @@
-//! The small model as one call: a sentence or a scene becomes a radar image with labels.
+//! Sampler of the small model: one call turns a sentence or a scene into a radar image with labels.
 
 mod image;
 mod pretrained;
@@ -27,14 +27,14 @@ pub use self_check::self_check;
 use wake_nn::noise::NoiseSource;
 use wake_nn::{check_finite, check_range};
 
-/// Steps from noise to image, unless others are asked for.
+/// Default number of steps from noise to image.
 const STEPS: usize = 3;
 
 /// Inputs that describe a scene to the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum PromptMode {
-    /// The numbers that [`wake_text`] reads from the words; where it leaves numbers or words of the field unread, also those
-    /// that the model reads.
+    /// The numbers that [`wake_text`] reads from the words; if it leaves numbers or domain words unread, also those that
+    /// the model reads.
     #[default]
     Both,
     /// The words alone, as the model reads them.
@@ -43,13 +43,13 @@ pub enum PromptMode {
     Numbers,
 }
 
-/// Draws radar images of ship wakes.
+/// Sampler of radar images of ship wakes.
 ///
 /// Prompt and values become one scene, which the result keeps: image, labels and speckle all follow from it, and
-/// [`sample_scenes`](Self::sample_scenes) of it draws the same image again. Its seed is the image's seed.
+/// [`sample_scenes`](Self::sample_scenes) of that scene gives the same image again. Its seed is the image's seed.
 ///
-/// Images are grey in the mapping that the model was trained with, [`WakeModelConfig::grey`], free of speckle as the model makes them.
-/// The sampler holds no gradients, whatever device its model was made on, and may be given to another thread, for
+/// The model's grey has the mapping of its training images, [`WakeModelConfig::grey`], and no speckle.
+/// The sampler holds no gradients, whatever device its model was made on, and can be moved to another thread, for
 /// instance to a data loader.
 ///
 /// # References
@@ -68,7 +68,7 @@ pub struct WakeSampler {
 }
 
 impl WakeSampler {
-    /// A sampler of a model with a valid configuration, on a device that may be faulty.
+    /// Makes a sampler of a model with a valid configuration, without checking the device.
     fn unchecked(model: WakeModel, config: WakeModelConfig) -> Self {
         #[cfg(feature = "autodiff")]
         let model = model.valid();
@@ -85,7 +85,7 @@ impl WakeSampler {
         }
     }
 
-    /// The same sampler with another number of steps, 1 to 1000.
+    /// Returns the sampler with another number of steps, 1 to 1000.
     ///
     /// # Errors
     ///
@@ -95,7 +95,7 @@ impl WakeSampler {
         Ok(Self { steps, ..self })
     }
 
-    /// The same sampler with a model that sees less.
+    /// Returns the sampler with other inputs for the model.
     #[must_use]
     pub fn with_prompt_mode(self, prompt_mode: PromptMode) -> Self {
         Self {
@@ -104,11 +104,11 @@ impl WakeSampler {
         }
     }
 
-    /// The same sampler with a sea learnt from real images, instead of the model's own sea and of speckle.
+    /// Returns the sampler with a sea learnt from real images, instead of the model's sea and speckle.
     ///
-    /// The image is then the one that physics expects of the scene, times a learnt sea of mean 1 with its speckle, and
-    /// the echoes of the ships on it, see [`SeaTexture::image`]. Of the model the parser of prompts is used alone; steps
-    /// are those of the learnt sea. Labels are as ever.
+    /// The image is then the expected image of the scene, times a learnt sea of mean 1 with its speckle, plus the echoes of
+    /// the ships, see [`SeaTexture::image`]. Only the prompt parser of the model is used; the steps are those of the learnt sea.
+    /// Labels do not change.
     ///
     /// # Errors
     ///
@@ -121,18 +121,17 @@ impl WakeSampler {
         })
     }
 
-    /// Steps from noise to image.
+    /// Number of steps from noise to image.
     pub fn steps(&self) -> usize {
         self.steps
     }
 
-    /// The scene that [`sample`](Self::sample) takes what a prompt leaves open from: the default one, on the
-    /// pixels of the model.
+    /// Scene whose values [`sample`](Self::sample) uses where a prompt leaves them open: the default scene, on the model's grid.
     pub fn base_scene(&self) -> Scene {
         self.config.base_scene()
     }
 
-    /// Checks that a scene is one that the model can draw.
+    /// Checks that a scene is within the model's training ranges.
     ///
     /// # Errors
     ///
@@ -141,26 +140,25 @@ impl WakeSampler {
         self.config.check_scene(scene)
     }
 
-    /// An image of a prompt, with the scene that was drawn and its labels.
+    /// Samples an image of a prompt, with its scene and labels.
     ///
     /// # Errors
     ///
-    /// [`Error::NothingStated`] for a prompt that states nothing of a scene, [`Error::Text`] for one whose numbers
-    /// contradict each other or are out of range, [`Error::Scene`] for a scene that physics refuses,
+    /// [`Error::NothingStated`] for a prompt that states nothing about a scene, [`Error::Text`] for one whose numbers
+    /// contradict each other or are out of range, [`Error::Scene`] for a scene that the physics rejects,
     /// [`wake_nn::Error::NotFinite`] for a model whose numbers overflow.
     pub fn sample(&self, prompt: &str, seed: u64) -> Result<WakeImage> {
         let mut images = self.sample_many(&[prompt], seed)?;
         Ok(images.swap_remove(0))
     }
 
-    /// An image of each prompt; image k has the seed `seed + k`.
+    /// Samples an image of each prompt; image k has the seed `seed + k`.
     ///
-    /// Calls whose seeds are closer than their prompts are many share seas: a loop counts its seed up by the number of
-    /// prompts.
+    /// Calls whose seeds differ by less than the number of prompts share seas: in a loop, increase the seed by that number.
     ///
     /// # Errors
     ///
-    /// As [`sample`](Self::sample), and [`wake_nn::Error::InvalidOption`] for no prompt.
+    /// As [`sample`](Self::sample), and [`wake_nn::Error::InvalidOption`] without a prompt.
     pub fn sample_many(&self, prompts: &[&str], seed: u64) -> Result<Vec<WakeImage>> {
         let begin = Instant::now();
         let input = |(k, prompt): (u64, &&str)| -> Result<Input> {
@@ -186,7 +184,7 @@ impl WakeSampler {
         self.run(&inputs?, begin)?.images()
     }
 
-    /// An image of each scene.
+    /// Samples an image of each scene.
     ///
     /// # Errors
     ///
@@ -196,8 +194,9 @@ impl WakeSampler {
         self.run(&self.inputs(scenes)?, begin)?.images()
     }
 
-    /// An image of each scene, in one batch on the device, without speckle but that of a learnt sea, and the labels of what
-    /// was drawn.
+    /// Samples an image of each scene in one batch on the device, with the labels of the scenes.
+    ///
+    /// The images have no speckle except that of a learnt sea.
     ///
     /// # Shapes
     ///
@@ -205,8 +204,8 @@ impl WakeSampler {
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::InvalidOption`] for no scene, or one that the model was not trained for, see
-    /// [`WakeModelConfig::check_scene`]; [`Error::Text`] for one that is not valid; [`wake_nn::Error::NotFinite`] for a model
+    /// [`wake_nn::Error::InvalidOption`] without a scene, or for one outside the training ranges, see
+    /// [`WakeModelConfig::check_scene`]; [`Error::Text`] for an invalid scene; [`wake_nn::Error::NotFinite`] for a model
     /// whose numbers overflow.
     pub fn sample_batch(&self, scenes: &[Scene]) -> Result<(Tensor<4>, Vec<Labels>)> {
         let drawn = self.run(&self.inputs(scenes)?, Instant::now())?;
@@ -214,7 +213,7 @@ impl WakeSampler {
         Ok((drawn.grey, labels))
     }
 
-    /// Numbers and words of some scenes.
+    /// Checks scenes, and puts them into words if the prompt mode needs words.
     fn inputs(&self, scenes: &[Scene]) -> Result<Vec<Input>> {
         let input = |scene: &Scene| {
             self.config.check_scene(scene)?;
@@ -230,7 +229,7 @@ impl WakeSampler {
         scenes.iter().map(input).collect()
     }
 
-    /// From noise to grey, all images at once.
+    /// Samples all images at once, from noise to grey.
     fn run(&self, inputs: &[Input], begin: Instant) -> Result<Drawn> {
         if inputs.is_empty() {
             return Err(Error::Model(wake_nn::Error::InvalidOption {
@@ -263,7 +262,7 @@ impl WakeSampler {
         }
         let sources = scenes.iter().map(|scene| NoiseSource::new(scene.seed));
         let sources: Vec<NoiseSource> = sources.collect();
-        // Neither needs the other, and one of a single image does not fill all cores.
+        // The two are independent, and one of them alone does not fill all cores for a single image.
         let (expected, seas) = rayon::join(
             || expected_greys(&scenes, &self.config.grey),
             || SeaFields::new(&scenes, &sources, &self.windows),
@@ -297,10 +296,10 @@ impl WakeSampler {
         })
     }
 
-    /// The scenes that are drawn: as they are given, or with what the model reads in words that the grammar did not understand.
+    /// Scenes to sample: as given, or completed by the model from words that the grammar did not recognise.
     fn resolved(&self, inputs: &[Input]) -> Result<Vec<Scene>> {
         let asked = |input: &Input| match self.prompt_mode {
-            // Of words that are all understood the model would only add what they do not say.
+            // For words that are all recognised, the model would only add values that they do not state.
             PromptMode::Both => input.unread.is_some(),
             PromptMode::Words => true,
             PromptMode::Numbers => false,
@@ -325,7 +324,7 @@ impl WakeSampler {
         inputs.iter().map(scene).collect()
     }
 
-    /// A scene whose ship, wind, depth and incidence are those of the base scene: what words alone are put into.
+    /// Scene with ship, wind, depth and incidence of the base scene, to be completed from words alone.
     fn unspoken(&self, scene: &Scene) -> Scene {
         let (mut scene, base) = (scene.clone(), self.base_scene());
         match base.ships.first() {
@@ -346,7 +345,7 @@ impl WakeSampler {
         scene
     }
 
-    /// Euler's steps along the flow, from noise to latents.
+    /// Euler steps along the flow, from noise to latents.
     fn denoise(
         &self,
         inputs: &ConditioningInputs,
@@ -365,25 +364,25 @@ impl WakeSampler {
     }
 }
 
-/// Levels of noise that each step begins and ends at, 1 − (k/n)^1.2: from 1 down to 0, first in shorter steps, where the flow bends
-/// most. The exponent is chosen.
+/// Noise levels at the beginning and end of each step, 1 − (k/n)^1.2, falling from 1 to 0. The first steps are shorter,
+/// where the flow bends most. The exponent is chosen.
 fn levels(steps: usize) -> impl Iterator<Item = [f64; 2]> {
     let level = move |k: usize| 1.0 - (k as f64 / steps as f64).powf(1.2);
     (0..steps).map(move |k| [level(k), level(k + 1)])
 }
 
-/// What an image is drawn from.
+/// Input of one image.
 struct Input {
-    /// The scene that is given, or that the prompt states.
+    /// The given scene, or the scene that the prompt states.
     scene: Scene,
     words: String,
-    /// What the prompt states, where some of its words were not understood that may state a value.
+    /// Values that the prompt states, if it has unrecognised words that may state a value.
     unread: Option<PartialScene>,
 }
 
-/// Images as they come from the model.
+/// Images as sampled from the model.
 struct Drawn {
-    /// What they show.
+    /// Scenes of the images.
     scenes: Vec<Scene>,
     grey: Tensor<4>,
     scale: GreyScale,
@@ -393,13 +392,13 @@ struct Drawn {
 
 /// All pixels of a batch.
 enum Pixels {
-    /// Grey, of all images in a row.
+    /// Grey of all images, one after another.
     Grey(Vec<f32>),
-    /// Intensities that have their speckle already.
+    /// Intensities that already have speckle.
     WithSpeckle(Vec<Field>),
 }
 
-/// Grey of some intensities of one size, `[images, 1, rows, columns]`.
+/// Converts intensities of one size to grey, `[images, 1, rows, columns]`.
 fn grey_of(intensities: &[Field], scale: &GreyScale, device: &Device) -> Tensor<4> {
     let size = intensities.first().map_or([0, 0], |f| [f.rows, f.columns]);
     let values = intensities.iter().flat_map(|f| &f.values);

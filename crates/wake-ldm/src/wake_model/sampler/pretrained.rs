@@ -1,4 +1,4 @@
-//! Where the weights of the small model come from.
+//! Weights of the small model: embedded in this crate, or from a folder.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::wake_model::network::{Part, WakeModel, WakeModelConfig};
 use wake_nn::weights::{Layout, load, load_bytes};
 
-/// Bytes of a file of the model in this crate.
+/// Bytes of one of the model's files in this crate.
 macro_rules! asset {
     ($name:literal) => {
         include_bytes!(concat!("../../../assets/", $name))
@@ -27,11 +27,12 @@ const fn weights(part: Part) -> &'static [u8] {
     }
 }
 
-/// The configuration of the model in this crate.
+/// Configuration of the model in this crate.
 const CONFIG: &str = include_str!("../../../assets/config.json");
 
 impl WakeSampler {
-    /// The files of the model in this crate, by their names; a folder of them is one for [`from_folder`](Self::from_folder).
+    /// Files of the model in this crate, by name; written into a folder, they can be read by
+    /// [`from_folder`](Self::from_folder).
     #[must_use]
     pub fn pretrained_files() -> [(&'static str, &'static [u8]); 5] {
         let file = |part: Part| (part.file(), weights(part));
@@ -44,22 +45,22 @@ impl WakeSampler {
         ]
     }
 
-    /// The model that lies in this crate.
+    /// Makes a sampler of the model embedded in this crate.
     ///
     /// # Errors
     ///
-    /// None that a build from unchanged files can give.
+    /// None for a build from unchanged files.
     pub fn pretrained(device: &Device) -> Result<Self> {
         let (model, config) = shipped(device)?;
         Self::new(model, config)
     }
 
-    /// A model that training wrote into a folder.
+    /// Reads a model that training wrote into a folder.
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::Io`], [`wake_nn::Error::Json`] or what
-    /// [`load`] finds for files that are not there or do not fit.
+    /// [`wake_nn::Error::Io`], [`wake_nn::Error::Json`] or the errors of
+    /// [`load`] for files that are missing or do not fit.
     pub fn from_folder(folder: &Path, device: &Device) -> Result<Self> {
         let config = WakeModelConfig::read(&folder.join(WakeModelConfig::FILE))?;
         let (model, layout) = (config.init(device), Layout::Diffusers);
@@ -74,7 +75,7 @@ impl WakeSampler {
     }
 }
 
-/// The model in this crate.
+/// Model and configuration in this crate.
 pub(super) fn shipped(device: &Device) -> Result<(WakeModel, WakeModelConfig)> {
     let config = WakeModelConfig::from_json(CONFIG, Path::new(WakeModelConfig::FILE))?;
     let model = config.init(device);
@@ -87,7 +88,7 @@ pub(super) fn shipped(device: &Device) -> Result<(WakeModel, WakeModelConfig)> {
     Ok((model, config))
 }
 
-/// A part with the weights in this crate.
+/// Loads a part's weights from this crate.
 fn embedded<M: Module>(module: M, part: Part) -> Result<M> {
     Ok(load_bytes(
         module,

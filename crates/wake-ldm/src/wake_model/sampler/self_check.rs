@@ -1,4 +1,4 @@
-//! Comparison of a device with the reference backend, by an image of the model in this crate.
+//! Comparison of a device with the reference backend, on an image of the model in this crate.
 
 use std::sync::Mutex;
 
@@ -10,26 +10,26 @@ use super::pretrained::shipped;
 use crate::error::Result;
 use crate::wake_model::network::{WakeModel, WakeModelConfig};
 
-/// What flex computes.
+/// Results of the flex backend.
 const REFERENCE: &[u8] = include_bytes!("../../../assets/wake_model_check.safetensors");
 
-/// Draws the default scene with the model in this crate on a device, and compares with numbers of the CPU backend flex.
+/// Samples the default scene with the embedded model on a device, and compares it with numbers of the CPU backend flex.
 ///
-/// Samplers do so by themselves on devices that are no CPU, once for each device.
+/// Samplers do this automatically on devices that are not CPUs, once per device.
 ///
 /// # Errors
 ///
-/// [`wake_nn::Error::WrongNumbers`] with the largest difference, and the allowed one.
+/// [`wake_nn::Error::WrongNumbers`] with the largest difference and the allowed difference.
 pub fn self_check(device: &Device) -> Result<()> {
     Ok(check::compare(device, REFERENCE, [stage(device)?])?)
 }
 
 impl WakeSampler {
-    /// A sampler of a model that lies in memory.
+    /// Makes a sampler of a model in memory.
     ///
     /// # Errors
     ///
-    /// As [`WakeModelConfig::validate`]; [`wake_nn::Error::WrongNumbers`] for a device that is no CPU and fails
+    /// As [`WakeModelConfig::validate`]; [`wake_nn::Error::WrongNumbers`] for a device that is not a CPU and fails
     /// [`self_check`].
     pub fn new(model: WakeModel, config: WakeModelConfig) -> Result<Self> {
         static CHECKED: Mutex<Vec<Device>> = Mutex::new(Vec::new());
@@ -51,7 +51,7 @@ fn stage(device: &Device) -> Result<Stage> {
 mod tests {
     use super::*;
 
-    /// With `DRAW=1` this writes the file anew.
+    /// With `DRAW=1` this rewrites the file.
     #[test]
     fn the_file_has_what_flex_computes() {
         let device = Device::flex();

@@ -1,4 +1,4 @@
-//! The model in the crate, as a user calls it.
+//! Tests of the embedded model through the public interface.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
@@ -52,7 +52,7 @@ fn a_prompt_becomes_an_image_with_the_labels_of_its_numbers() {
         let grey = 255.0 * scale.grey(f64::from(value));
         assert!((grey - f64::from(level)).abs() <= 0.5, "{level} {grey}");
     }
-    // Each stage takes some time, and all of it is theirs.
+    // Each stage takes some time, and the stages add up to the total.
     let s = image.seconds;
     let stages = [s.text, s.expect, s.denoise, s.decode];
     assert!(
@@ -67,7 +67,7 @@ fn a_prompt_becomes_an_image_with_the_labels_of_its_numbers() {
     );
 }
 
-/// The grey of a model's own mapping: levels, intensity, and that of a learnt sea.
+/// Levels, intensity and the image of a learnt sea all use the model's own grey mapping.
 #[test]
 fn grey_is_that_of_the_models_mapping() {
     let mut sampler = sampler();
@@ -82,7 +82,7 @@ fn grey_is_that_of_the_models_mapping() {
         assert_eq!(image.scale, scale);
         for (&grey, &power) in image.grey.values.iter().zip(&image.intensity.values) {
             let expected = scale.grey(f64::from(power));
-            // Grey of the network may lie beyond its ends; what is cut is not compared.
+            // Grey from the network may exceed its range; clamped values are not compared.
             if (0.0..=1.0).contains(&grey) {
                 assert!(
                     (f64::from(grey) - expected).abs() < 1e-6,
@@ -95,7 +95,7 @@ fn grey_is_that_of_the_models_mapping() {
             assert_eq!(level, scale.level(f64::from(power)));
         }
     }
-    // The expected image that it starts from is in that mapping, too.
+    // The expected image from which it starts uses that mapping, too.
     let other = sampler.sample(PROMPT, 3).unwrap();
     assert!(distance(&decibel.grey.values, &other.grey.values) > 1e-3);
 }
@@ -110,7 +110,7 @@ fn levels_fall_from_all_noise_to_none_step_after_step() {
     assert!(drops[0] > 0.0 && drops.is_sorted_by(|before, after| before < after));
 }
 
-/// A velocity b everywhere carries the noise by −b π/2 over the quarter circle, in any number of steps.
+/// A constant velocity b moves the noise by −b π/2 over the quarter circle, in any number of steps.
 #[test]
 fn steps_follow_the_velocity_from_noise_to_latents() {
     let mut sampler = sampler();
@@ -139,7 +139,7 @@ fn steps_follow_the_velocity_from_noise_to_latents() {
     }
 }
 
-/// Leaves of a network its biases, all 0.1: what it says is 0.1 everywhere.
+/// Sets all weights of a network to 0 and its biases to 0.1, so that it returns 0.1 everywhere.
 struct Constant;
 
 impl burn::module::ModuleMapper for Constant {
@@ -148,7 +148,7 @@ impl burn::module::ModuleMapper for Constant {
     }
 }
 
-/// What words that are all understood leave open is the base scene's, not what the model makes of them.
+/// If all words are recognised, the base scene and not the model gives the values that they leave open.
 #[test]
 fn nothing_is_added_to_words_that_are_understood() {
     let sampler = sampler();
@@ -156,7 +156,7 @@ fn nothing_is_added_to_words_that_are_understood() {
     for prompt in [
         "A ship moving at 8 mps toward 45 degrees.",
         "wind 6 m/s toward 200 degrees",
-        // What only describes states nothing that the model could add.
+        // Descriptive words state nothing that the model could add.
         "a red ship moving at 8 mps toward 45 degrees",
     ] {
         let scene = sampler.sample(prompt, 3).unwrap().scene;
@@ -167,7 +167,7 @@ fn nothing_is_added_to_words_that_are_understood() {
     }
 }
 
-/// Seas that differ by their seeds.
+/// Scenes that differ only in their seeds.
 fn scenes(sampler: &WakeSampler, seeds: &[u64]) -> Vec<Scene> {
     let base = sampler.base_scene();
     let scene = |&seed: &u64| Scene {
@@ -177,18 +177,18 @@ fn scenes(sampler: &WakeSampler, seeds: &[u64]) -> Vec<Scene> {
     seeds.iter().map(scene).collect()
 }
 
-/// Largest difference of two images.
+/// Largest difference between two images.
 fn distance(a: &[f32], b: &[f32]) -> f32 {
     let differences = a.iter().zip(b).map(|(a, b)| (a - b).abs());
     differences.fold(0.0, f32::max)
 }
 
-/// Matrix products of another size may sum in another order.
+/// Allowed difference for the same image: matrix products of another size may sum in another order.
 const SAME: f32 = 1e-4;
 /// Two seas differ by more than this in some pixel.
 const OTHER: f32 = 1e-2;
 
-/// A loop that counts its seeds up by one must not get a sea of the batch before.
+/// A loop that increases its seed by one must not repeat a sea of the batch before.
 #[test]
 fn the_seed_of_a_scene_is_its_own_in_every_batch() {
     let sampler = sampler();
@@ -222,7 +222,7 @@ fn the_seed_of_a_scene_is_its_own_in_every_batch() {
     );
 }
 
-/// What the result says is what was drawn: drawing it again from its numbers gives the same image and labels.
+/// The result holds the sampled scene: sampling it again from its numbers gives the same image and labels.
 #[test]
 fn image_labels_and_scene_are_one() {
     let sampler = sampler();
@@ -263,7 +263,7 @@ fn image_labels_and_scene_are_one() {
     }
 }
 
-/// A scene that is given comes back as it is: without wind, with its direction, and with a second ship.
+/// A given scene is returned unchanged: without wind, with its direction, and with a second ship.
 #[test]
 fn a_given_scene_is_drawn_untouched() {
     let sampler = sampler();
@@ -283,7 +283,7 @@ fn a_given_scene_is_drawn_untouched() {
     }
 }
 
-/// With words alone the parser says whether there is a ship, and labels and image follow it.
+/// With words alone, the parser decides whether there is a ship, and labels and image follow it.
 #[test]
 fn an_open_sea_that_only_the_words_state_has_no_labels_of_a_ship() {
     let sampler = sampler().with_prompt_mode(PromptMode::Words);
@@ -371,7 +371,7 @@ fn a_sampler_made_for_training_holds_no_gradients() {
     assert!(!batch.is_autodiff());
 }
 
-/// Puts every weight on an autodiff device.
+/// Moves every weight to an autodiff device.
 #[cfg(feature = "autodiff")]
 struct Tracked;
 
@@ -404,7 +404,7 @@ fn words_and_numbers_each_move_the_image() {
     }
 }
 
-/// A learnt sea of white noise and a flow without training.
+/// A learnt sea of white noise with an untrained flow.
 fn white_sea(spacing: Option<f64>) -> SeaTexture {
     let white = NoiseSource::new(2).normal(0, 128 * 128);
     let patch = Field {
@@ -416,7 +416,7 @@ fn white_sea(spacing: Option<f64>) -> SeaTexture {
     SeaTexture::new(SeaFlow::new(&Device::flex()), &[style], spacing).unwrap()
 }
 
-/// The sea changes, what is where does not: labels, scenes and the words' meaning are those of the model's own sea.
+/// A learnt sea changes only the sea: labels and scenes are the same as with the model's own sea.
 #[test]
 fn a_learnt_sea_changes_the_image_and_no_label() {
     let plain = sampler();
@@ -426,7 +426,7 @@ fn a_learnt_sea_changes_the_image_and_no_label() {
     assert_eq!(one.labels, other.labels);
     assert_eq!(one.scene, other.scene);
     assert!(distance(&one.speckled.values, &other.speckled.values) > 1e-3);
-    // One sea, one speckle: intensity and grey are those of the image.
+    // One sea with one speckle: intensity and grey are those of the speckled image.
     assert_eq!(other.intensity, other.speckled);
     assert_eq!(other.intensity, sea.image(&other.scene).unwrap());
     let scale = GreyScale::default();

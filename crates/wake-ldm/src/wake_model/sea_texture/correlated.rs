@@ -1,10 +1,10 @@
-//! The correlation of a field's pixels, and Gaussian fields that have it.
+//! Correlation of a field's pixels, and Gaussian fields with a given correlation.
 
 use num_complex::Complex32;
 use wake_physics::Field;
 use wake_physics::waves::{fast_length, lattice_sum};
 
-/// Correlation of two pixels by their distance, up to some rows and columns apart.
+/// Correlation of two pixels by their distance, up to a number of rows and columns apart.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Correlation {
     lags: usize,
@@ -13,8 +13,8 @@ pub(super) struct Correlation {
 }
 
 impl Correlation {
-    /// The correlation of the pixels of a field, each distance by the mean over all pairs that far apart; `None` for a
-    /// field of one value, or no larger than the lags.
+    /// Estimates the correlation of a field's pixels, as the mean over all pairs at each distance; `None` for a
+    /// constant field, or one no larger than the lags.
     pub(super) fn of(field: &Field, lags: usize) -> Option<Self> {
         if field.rows <= lags || field.columns <= lags {
             return None;
@@ -25,7 +25,7 @@ impl Correlation {
         if variance.is_nan() || variance <= 0.0 {
             return None;
         }
-        // With so many zeros around the field no pixel meets another around the edge.
+        // With this many zeros around the field, no pixel is paired with another across the edge.
         let [rows, columns] = [field.rows, field.columns].map(|n| fast_length(n + lags));
         let mut waves = vec![Complex32::default(); rows * columns];
         for (i, line) in field.values.chunks_exact(field.columns).enumerate() {
@@ -52,8 +52,8 @@ impl Correlation {
         })
     }
 
-    /// A correlation of given values, `[lags + 1, 2 lags + 1]`: 0 to `lags` rows down, −`lags` to `lags` columns to the
-    /// right; `None` for another number of them, for one outside −1 to 1, or one that is not 1 of a pixel with itself.
+    /// Makes a correlation from values `[lags + 1, 2 lags + 1]`: 0 to `lags` rows down, −`lags` to `lags` columns to the
+    /// right; `None` for another number of values, for a value outside −1 to 1, or if a pixel's own correlation is not 1.
     pub(super) fn new(lags: usize, values: Vec<f32>) -> Option<Self> {
         let sound = values.len() == (lags + 1) * (2 * lags + 1)
             && values.iter().all(|v| (-1.0..=1.0).contains(v))
@@ -66,9 +66,9 @@ impl Correlation {
         &self.values
     }
 
-    /// Correlation of pixels so many rows and columns apart; 0 beyond the lags.
+    /// Correlation of pixels a number of rows and columns apart; 0 beyond the lags.
     pub(super) fn at(&self, down: isize, right: isize) -> f32 {
-        // A pixel is as far from another as that one is from it.
+        // The correlation is the same in opposite directions.
         let [down, right] = if down < 0 {
             [-down, -right]
         } else {
@@ -88,7 +88,7 @@ fn places(lags: usize) -> impl Iterator<Item = (usize, isize)> {
     (0..=lags).flat_map(move |down| right.clone().map(move |right| (down, right)))
 }
 
-/// Parzen's window, 1 at distance 0 and 0 at `lags` and beyond: its own transform is nowhere negative.
+/// Parzen window, 1 at distance 0 and 0 from `lags` on; its transform is nowhere negative.
 fn parzen(distance: isize, lags: usize) -> f64 {
     let u = distance.unsigned_abs() as f64 / lags.max(1) as f64;
     match u {
@@ -99,7 +99,7 @@ fn parzen(distance: isize, lags: usize) -> f64 {
     }
 }
 
-/// Real part of the sum of waves of amplitudes `[rows, columns]`.
+/// Real part of the sum of waves with amplitudes `[rows, columns]`.
 fn transposed_sum(amplitudes: &[f32], [rows, columns]: [usize; 2]) -> Vec<f32> {
     let mut waves = vec![Complex32::default(); rows * columns];
     for (i, line) in amplitudes.chunks_exact(columns).enumerate() {
@@ -111,15 +111,14 @@ fn transposed_sum(amplitudes: &[f32], [rows, columns]: [usize; 2]) -> Vec<f32> {
     re
 }
 
-/// Gaussian noise of variance 1 whose pixels are correlated: a spectrum from the correlation, on a torus that is larger
-/// than the image.
+/// Correlated Gaussian noise of variance 1, from the spectrum of a correlation on a torus larger than the image.
 ///
 /// ```text
 /// P(k) = max(0, Σ w(d) ρ(d) cos k·d),     n(x) = Re Σ √(P(k)/Σ P) (a + i b) exp(i k·x),   a, b normal
 /// ```
 ///
-/// with Parzen's window w of the lags along both axes. Where P is nowhere below 0 the noise has the correlation w ρ: of 32 lags,
-/// 0.994 ρ between neighbours, half of ρ 11 pixels apart, none beyond the lags.
+/// where w is Parzen's window of the lags along both axes. If P is nowhere negative, the noise has the correlation w ρ: with
+/// 32 lags, 0.994 ρ between neighbours, half of ρ 11 pixels apart, and none beyond the lags.
 ///
 /// # References
 ///
@@ -129,14 +128,14 @@ fn transposed_sum(amplitudes: &[f32], [rows, columns]: [usize; 2]) -> Vec<f32> {
 #[derive(Debug, Clone)]
 pub(super) struct CorrelatedNoise {
     size: [usize; 2],
-    /// Pixels of a period, rows and columns.
+    /// Rows and columns of a period in pixels.
     period: [usize; 2],
     /// √(P/ΣP) of each wave, `[columns, rows]` of the period.
     amplitudes: Vec<f32>,
 }
 
 impl CorrelatedNoise {
-    /// The noise of an image of `rows` and `columns`, at least 1 each; its opposite edges are independent.
+    /// Noise for images of `rows` and `columns`, at least 1 each; opposite edges are independent.
     pub(super) fn new(correlation: &Correlation, rows: usize, columns: usize) -> Self {
         let lags = correlation.lags;
         let [high, wide] = [rows, columns].map(|n| fast_length((n + lags).max(2 * lags + 1)));
@@ -153,7 +152,7 @@ impl CorrelatedNoise {
             }
         }
         let power = transposed_sum(&windowed, [high, wide]);
-        // The mean of P is the variance, so that some of it is above 0.
+        // The mean of P is the variance, so some of P is above 0.
         let total: f64 = power.iter().map(|&p| f64::from(p.max(0.0))).sum();
         let mut amplitudes = vec![0.0; high * wide];
         for (n, &p) in power.iter().enumerate() {
@@ -167,12 +166,12 @@ impl CorrelatedNoise {
         }
     }
 
-    /// Independent standard normal numbers that [`field`](Self::field) is made of.
+    /// Number of independent standard normal numbers that [`field`](Self::field) needs.
     pub(super) fn normals(&self) -> usize {
         2 * self.amplitudes.len()
     }
 
-    /// One field of noise.
+    /// Makes one field of noise.
     ///
     /// # Panics
     ///
@@ -213,7 +212,7 @@ mod tests {
         }
     }
 
-    /// Against the sums themselves; the transforms of 30 × 37 values in f32 round to a few 1e-6.
+    /// Comparison with direct sums; the transforms of 30 × 37 values in f32 round to a few 1e-6.
     #[test]
     fn the_correlation_is_the_mean_product_of_all_pairs() {
         let white = normals(23 * 31, 4);
@@ -263,8 +262,8 @@ mod tests {
         assert_eq!(Correlation::new(1, values), None);
     }
 
-    /// A correlation with a direction, exp(−(d/5)²) along the diagonal and exp(−d²) across: the mean over many fields has it
-    /// within five standard errors and the window's loss, at most 1 − w.
+    /// A correlation with a direction, exp(−(d/5)²) along the diagonal and exp(−d²) across: the mean over many fields agrees
+    /// within five standard errors and the loss of the window, at most 1 − w.
     #[test]
     fn noise_has_the_correlation_that_was_asked_for() {
         let lags = 16;
@@ -294,7 +293,7 @@ mod tests {
             }
             sum / pairs
         };
-        // Sum of ρ² over all distances: pixels that a product shares its chance with, π · 5/√2 · 1/√2.
+        // Sum of ρ² over all distances, the number of pixels that share the random error of a product: π · 5/√2 · 1/√2.
         let shared = std::f64::consts::PI * 2.5;
         let error = 5.0 * (2.0 * shared / (fields * 90 * 120) as f64).sqrt();
         for (down, right) in [(0, 0), (1, 1), (1, -1), (0, 3), (3, 0), (4, 4), (3, -3)] {
@@ -308,7 +307,7 @@ mod tests {
         }
     }
 
-    /// White noise stays white, also in an image smaller than the lags.
+    /// White noise stays white, even in an image smaller than the lags.
     #[test]
     fn lags_may_be_longer_than_the_image() {
         let mut values = vec![0.0; 9 * 17];

@@ -1,4 +1,4 @@
-//! From Gaussian noise with the correlation of a sea to the sea.
+//! Flow from Gaussian noise with the correlation of a sea to the sea itself.
 
 use burn::module::Module;
 use burn::nn::conv::Conv2d;
@@ -15,25 +15,25 @@ use wake_nn::resample::{Downsample, Upsample};
 use wake_nn::resnet::{ResnetBlock, ResnetShape};
 use wake_nn::timestep::{TimestepEmbedding, sinusoidal_embedding};
 
-/// Side of the squares of pixels that are one pixel of many channels to the network.
+/// Side of the squares of pixels that the network folds into channels of one pixel.
 const FOLD: usize = 4;
-/// Channels at the folded size, and at half of it.
+/// Channels at the folded size, and at half that size.
 const WIDTHS: [usize; 2] = [48, 96];
 /// Rows and columns of an image are multiples of this.
 pub(super) const MULTIPLE: usize = 2 * FOLD;
 const TIME: usize = 4 * WIDTHS[0];
 const GROUPS: usize = 16;
 const EPSILON: f64 = 1e-5;
-/// The steps that σ = 1 stands for in the embedding of the step.
+/// Number of steps that σ = 1 corresponds to in the embedding of the step.
 const STEPS: f64 = 1000.0;
 
-/// The velocity that carries noise n into the standardized amplitude r of a patch, along x = cos φ r + sin φ n, φ = πσ/2.
+/// Flow from noise n to the standardised amplitude r of a patch, along x = cos φ r + sin φ n, φ = πσ/2.
 ///
-/// The noise has the correlation of the patch's style. Were the sea no more than that, the velocity would be 0 everywhere: the
-/// flow only has to learn what tells a sea from Gaussian noise of its own spectrum.
+/// The noise has the correlation of the patch's style. If the sea were Gaussian, the velocity would be 0 everywhere: the
+/// flow has to learn only the difference between a sea and Gaussian noise with its spectrum.
 ///
-/// Convolutions alone, 0.8 million weights: images of any size, a multiple of 8, whose outermost pixels see zeros beyond
-/// the edge. What is drawn has a margin that is cut off.
+/// The network has only convolutions, with 0.8 million weights, and takes images of any size that is a multiple of 8.
+/// Beyond the edge the outermost pixels see zeros, so images are sampled with a margin that is cut off.
 ///
 /// # References
 ///
@@ -55,7 +55,7 @@ pub struct SeaFlow {
 }
 
 impl SeaFlow {
-    /// A flow with random weights.
+    /// Makes a flow with random weights.
     pub fn new(device: &Device) -> Self {
         let block = |channels_in, channels_out| {
             let shape = ResnetShape {
@@ -84,7 +84,7 @@ impl SeaFlow {
         }
     }
 
-    /// Its shape, as a run notes it.
+    /// Shape of the network, as recorded by a training run.
     pub fn shape() -> Value {
         json!({"sea": {"fold": FOLD, "widths": WIDTHS, "features": FEATURES}})
     }
@@ -94,9 +94,9 @@ impl SeaFlow {
         self.conv_in.weight.val().dtype()
     }
 
-    /// The velocity ∂x/∂φ = cos φ n − sin φ r, on average over all r and n that make x.
+    /// Predicts the velocity ∂x/∂φ = cos φ n − sin φ r, averaged over all r and n that give x.
     ///
-    /// - `features`: of the styles, `[batch, 8]`
+    /// - `features`: features of the styles, `[batch, 8]`
     ///
     /// # Shapes
     ///

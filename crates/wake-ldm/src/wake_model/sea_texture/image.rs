@@ -1,14 +1,14 @@
-//! An image of the sea, and what of it is open sea.
+//! An image of the sea, and the open sea in it.
 
 use wake_physics::Field;
 
 use super::style::SeaStyle;
 use crate::error::{Error, Result};
 
-/// Rows and columns of the patches that a sea is learnt from.
+/// Rows and columns of the patches from which a sea is learnt.
 pub const WINDOW: usize = 128;
 
-/// Amplitudes of any scale, and the pixels that shall not be looked at.
+/// Amplitudes of any scale, with an optional mask of pixels that are ignored.
 #[derive(Debug, Clone)]
 pub struct SeaImage {
     amplitude: Field,
@@ -16,7 +16,7 @@ pub struct SeaImage {
 }
 
 impl SeaImage {
-    /// An image, and above 0 in `mask` where it shall not be looked at.
+    /// Makes an image; pixels with `mask` above 0 are ignored.
     ///
     /// # Errors
     ///
@@ -37,19 +37,19 @@ impl SeaImage {
         })
     }
 
-    /// Rows and columns.
+    /// Rows and columns of the image.
     pub fn size(&self) -> [usize; 2] {
         [self.amplitude.rows, self.amplitude.columns]
     }
 
-    /// Places of the first pixels of patches beside each other that fit into the image.
+    /// Positions of the first pixels of adjacent patches that fit into the image.
     pub fn places(&self) -> impl Iterator<Item = [usize; 2]> {
         let [rows, columns] = self.size().map(|n| n / WINDOW);
         (0..rows * columns).map(move |n| [n / columns * WINDOW, n % columns * WINDOW])
     }
 
-    /// The patch of [`WINDOW`] rows and columns at a place, and its style; `None` where it is masked anywhere, is no open
-    /// sea, or lies beyond the image.
+    /// Returns the patch of [`WINDOW`] rows and columns at a position, and its style; `None` if any pixel is masked, or if the
+    /// patch is not open sea or extends beyond the image.
     pub fn patch(&self, place: [usize; 2]) -> Option<(Field, SeaStyle)> {
         if let Some(hidden) = &self.hidden
             && cut(hidden, place)?.values.iter().any(|&m| m > 0.0)
@@ -62,7 +62,7 @@ impl SeaImage {
     }
 }
 
-/// A patch of a field; `None` where it does not lie inside.
+/// Cuts a patch out of a field; `None` if the patch is not inside.
 fn cut(field: &Field, [top, left]: [usize; 2]) -> Option<Field> {
     if top + WINDOW > field.rows || left + WINDOW > field.columns {
         return None;
@@ -82,7 +82,7 @@ mod tests {
     use super::*;
     use wake_nn::noise::NoiseSource;
 
-    /// White noise of mean 100 and spread 10.
+    /// White noise of mean 100 and standard deviation 10.
     fn rough(rows: usize, columns: usize) -> Field {
         let white = NoiseSource::new(3).normal(0, rows * columns);
         Field {
@@ -108,7 +108,7 @@ mod tests {
             .collect();
         assert_eq!(open.places().count(), 4);
         assert_eq!(found, [[0, 0], [WINDOW, WINDOW]]);
-        // Beside the target and below the marked pixel, by one.
+        // Patches one pixel away from the target, and just below the marked pixel.
         assert!(open.patch([1, WINDOW]).is_some() && open.patch([0, WINDOW]).is_none());
         assert!(open.patch([WINDOW + 5, WINDOW]).is_some());
         assert!(open.patch([WINDOW + 5, WINDOW - 1]).is_none());
@@ -118,7 +118,7 @@ mod tests {
         assert!(refused.contains("mask is 295 x 256"), "{refused}");
     }
 
-    /// Of 16,384 white pixels: mean 1, spread a tenth, correlation 0 within five standard errors, whatever the scale.
+    /// For 16,384 white pixels: mean 1, spread 0.1 and correlation 0 within five standard errors, at any scale.
     #[test]
     fn the_style_is_that_of_the_pixels() {
         let image = rough(WINDOW, WINDOW);
@@ -128,7 +128,7 @@ mod tests {
             .unwrap();
         assert_eq!(patch, image);
         let error = 5.0 / WINDOW as f32;
-        // A median is known π/2 times as badly as a mean.
+        // The standard error of a median is √(π/2) times that of a mean.
         assert!((style.mean() - 1.0).abs() < 0.1 * error * 1.6);
         assert!((style.spread() - 0.1).abs() < 0.1 * error);
         let features = style.features();
@@ -145,8 +145,9 @@ mod tests {
         assert_eq!(SeaStyle::of(&flat), None);
     }
 
-    /// A coast through the middle has block means of 80 ± 20, a variation of a quarter, a weaker one 90 ± 10. Points of 200 on one
-    /// pixel in ten have a skewness of 0.1 · 0.9 · 0.8 · 100³/(1,030)^{3/2}, 2.2, and are no targets: eight deviations of 32
+    /// A coast through the middle has block means of 80 ± 20, a variation of a quarter; a weaker one has 90 ± 10.
+    /// Values of 200 on
+    /// one pixel in ten have a skewness of 0.1 · 0.9 · 0.8 · 100³/(1,030)^{3/2}, 2.2, and are not targets: eight deviations of 32
     /// above the mean of 110 is 367.
     #[test]
     fn land_and_coasts_are_no_sea() {

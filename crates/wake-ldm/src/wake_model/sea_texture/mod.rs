@@ -1,4 +1,4 @@
-//! The sea of real images: what it looks like, learnt from patches of them, and drawn again.
+//! Texture of the sea in real images, learnt from patches of them and sampled.
 //!
 //! ```text
 //! image ─► open patches ─► styles ─► Gaussian noise of a style's correlation ─► flow ─► amplitude with its speckle

@@ -1,4 +1,4 @@
-//! What seas differ in: a few statistics of a patch, and the correlation of its pixels.
+//! Style of a sea: a few statistics of a patch, and the correlation of its pixels.
 
 use wake_physics::Field;
 use wake_physics::measure::{Texture, median, texture};
@@ -9,19 +9,19 @@ use crate::streams::SEA_TEXTURE_STREAM;
 use wake_nn::check_range;
 use wake_nn::noise::NoiseSource;
 
-/// Largest distance of pixels whose correlation a style keeps.
+/// Largest distance between pixels whose correlation a style keeps.
 pub(super) const LAGS: usize = 32;
-/// A pixel brighter than so many medians is no sea: chosen, a little above the brightest of 128² pixels of one look.
+/// Largest amplitude of open sea in medians (chosen): a little above the brightest of 128² pixels of one look.
 const BRIGHTEST: f32 = 4.0;
-/// Speckle of one look has 0.63, what is more skewed than this holds bright points, as land does: chosen.
+/// Largest skewness of open sea (chosen): speckle of one look has 0.63; bright points, as on land, give more.
 const MOST_SKEWED: f64 = 1.0;
-/// Means of blocks of 32 pixels of a sea vary by less: chosen, above the gusts of real images and below most coasts.
+/// Largest variation of the means of blocks of 32 pixels (chosen): above the gusts of real images, below most coasts.
 const MOST_VARIED: f64 = 0.2;
-/// Numbers of a style that condition the flow.
+/// Number of features of a style that condition the flow.
 pub(super) const FEATURES: usize = 8;
-/// Numbers of a style in a file: those and the mean.
+/// Number of values of a style in a file: the features and the mean.
 pub(super) const NUMBERS: usize = FEATURES + 1;
-/// Names and ranges of the numbers of a style in a file.
+/// Names and ranges of the values of a style in a file.
 const RANGES: [(&str, f64, f64); NUMBERS] = [
     ("mean", 0.5, 2.0),
     ("spread", 1e-3, 2.0),
@@ -34,24 +34,26 @@ const RANGES: [(&str, f64, f64); NUMBERS] = [
     ("variation of blocks of 32", 0.0, 2.0),
 ];
 
-/// Statistics of a patch of open sea, of its amplitude over its own median.
+/// Statistics of a patch of open sea, of its amplitude divided by its median.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeaStyle {
-    /// Mean, spread, and the rest of [`RANGES`].
+    /// Mean, spread, and the other values of [`RANGES`].
     numbers: [f32; NUMBERS],
     correlation: Correlation,
 }
 
 impl SeaStyle {
-    /// The style of a square patch of amplitudes of any scale; `None` where it is smaller than 64 pixels, of one value, or
-    /// is no open sea: with a pixel above four medians or eight standard deviations above the mean (a target), a skewness above
-    /// 1 (land), or means of blocks of 32 pixels that vary by more than a fifth (a coast, a front).
+    /// Estimates the style of a square patch of amplitudes of any scale; `None` if it is not open sea.
+    ///
+    /// A patch is rejected if it is smaller than 64 pixels or constant, has a pixel above four medians or eight standard
+    /// deviations above the mean (a target) or a skewness above 1 (land), or if means of blocks of 32 pixels vary by more than
+    /// a fifth (a coast, a front).
     #[must_use]
     pub fn of(amplitude: &Field) -> Option<Self> {
         let side = amplitude.rows;
         let median = median(&amplitude.values);
         let largest = amplitude.values.iter().copied().fold(0.0, f32::max);
-        // A median of 0 or no number fails, too.
+        // A median of 0 or NaN fails, too.
         let lit = median > 0.0 && largest <= BRIGHTEST * median;
         if side < 2 * LAGS || amplitude.columns != side || !lit {
             return None;
@@ -73,11 +75,11 @@ impl SeaStyle {
         .ok()
     }
 
-    /// A style from numbers that may be anybody's.
+    /// Makes a style from unchecked numbers.
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::OutOfRange`] with the first number that no sea has.
+    /// [`wake_nn::Error::OutOfRange`] with the first number that is out of range for a sea.
     pub(super) fn new(numbers: [f32; NUMBERS], correlation: Correlation) -> Result<Self> {
         for (number, (name, min, max)) in numbers.iter().zip(RANGES) {
             check_range(name, f64::from(*number), min, max)?;
@@ -88,11 +90,11 @@ impl SeaStyle {
         })
     }
 
-    /// A style from a row of each of a file's tensors.
+    /// Makes a style from one row of each tensor of a file.
     ///
     /// # Errors
     ///
-    /// As [`new`](Self::new), and [`wake_nn::Error::InvalidOption`] for what is no correlation.
+    /// As [`new`](Self::new), and [`wake_nn::Error::InvalidOption`] for values that are not a correlation.
     pub(super) fn of_rows(numbers: &[f32], correlation: &[f32]) -> Result<Self> {
         let Some(correlation) = Correlation::new(LAGS, correlation.to_vec()) else {
             return Err(Error::Model(wake_nn::Error::InvalidOption {
@@ -105,13 +107,13 @@ impl SeaStyle {
         Self::new(numbers, correlation)
     }
 
-    /// Mean amplitude over its median.
+    /// Mean amplitude divided by the median.
     #[must_use]
     pub fn mean(&self) -> f32 {
         self.numbers[0]
     }
 
-    /// Standard deviation of the amplitude over its median.
+    /// Standard deviation of the amplitude divided by its median.
     #[must_use]
     pub fn spread(&self) -> f32 {
         self.numbers[1]
@@ -125,11 +127,11 @@ impl SeaStyle {
         self.correlation.values()
     }
 
-    /// Conditions of the flow: numbers of mean about 0 and of order 1.
+    /// Features that condition the flow, with mean about 0 and of order 1.
     pub fn features(&self) -> [f32; FEATURES] {
         let [_, spread, skewness, ref rest @ ..] = self.numbers;
         let [along @ .., fine, coarse] = rest;
-        // Logarithms of what is positive; the smallest block variation that 8 bits of grey show is some 1e-3.
+        // Logarithms of positive values; the smallest block variation that 8 bits of grey resolve is some 1e-3.
         let logarithm = |x: f32| (x.max(1e-3)).ln();
         let mut features = [0.0; FEATURES];
         features[0] = logarithm(spread) + 1.5;
@@ -140,8 +142,8 @@ impl SeaStyle {
         features
     }
 
-    /// Gaussian noise of mean 0 and variance 1 with the correlation of the style: what a sea is that has no more than a
-    /// spectrum.
+    /// Gaussian noise of mean 0 and variance 1 with the correlation of the style: a sea with this spectrum and no other
+    /// structure.
     #[must_use]
     pub fn noise(&self, source: NoiseSource, rows: usize, columns: usize) -> Field {
         let noise = CorrelatedNoise::new(&self.correlation, rows, columns);

@@ -1,4 +1,4 @@
-//! The way back through attention: tokens lie side by side in a tile, queries pass by.
+//! Backward pass of attention: a tile holds tokens side by side, and queries are processed in turn.
 
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
@@ -9,17 +9,17 @@ use super::super::tile;
 use super::Shape;
 use super::forward::{Softmax, TOKENS, add_values, products};
 
-/// Queries whose weights are there at a time: as many as tokens on the way forward.
+/// Queries whose weights are held at a time: as many as tokens in the forward pass.
 const QUERIES: usize = TOKENS;
 
-/// Result of an attention, and the sums that its gradients need.
+/// Result of an attention, and the softmax statistics that its gradients need.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Attended<'a> {
     pub(crate) values: &'a [f32],
     pub(crate) softmax: &'a [Softmax],
 }
 
-/// Gradients to query, key and value.
+/// Gradients with respect to query, key and value.
 ///
 /// ```text
 /// P = softmax(s Q Kᵀ),   dV = Pᵀ dO,   dP = dO Vᵀ
@@ -28,7 +28,7 @@ pub(crate) struct Attended<'a> {
 ///
 /// # Shapes
 ///
-/// As [`attend`](super::attend), whose result is `attended`; `gradient` as its values.
+/// As for [`attend`](super::attend), whose result is `attended`; `gradient` has the shape of its values.
 ///
 /// # References
 ///
@@ -76,7 +76,7 @@ pub(crate) fn gradients(
     [join(0, asking), join(1, seen), join(2, seen)]
 }
 
-/// One head of one sequence, on the way back.
+/// One head of one sequence in the backward pass.
 struct Backward<'a> {
     query: Rows<'a>,
     key: Rows<'a>,
@@ -104,7 +104,7 @@ impl WithSimd for Backward<'_> {
                 a.iter().zip(b).map(|(a, b)| a * b).sum()
             })
             .collect();
-        // One column a token.
+        // One column per token.
         let [mut weights, mut slopes] = [0; 2].map(|_| vec![0.0; QUERIES.min(asking) * width]);
         for token in (0..seen).step_by(width) {
             let [key, value] = [self.key, self.value].map(|rows| rows.from(token, width));
@@ -112,7 +112,7 @@ impl WithSimd for Backward<'_> {
             let values = value.pack_transposed(depth, width);
             let right = key.pack(depth, width);
             let [mut of_key, mut of_value] = [0; 2].map(|_| vec![0.0; depth * width]);
-            // Queries before a token do not see it.
+            // Queries before a token do not attend to it.
             let begin = if self.shape.causal { token } else { 0 };
             for first in (begin..asking).step_by(QUERIES) {
                 let count = QUERIES.min(asking - first);

@@ -1,4 +1,4 @@
-//! Attention forward: queries lie side by side in a tile, tokens pass by.
+//! Forward pass of attention: a tile holds queries side by side, and tokens are processed in turn.
 
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
@@ -8,24 +8,24 @@ use super::super::silu::exp;
 use super::super::tile::{self, ROWS};
 use super::Shape;
 
-/// Tokens whose scores are there at a time, a multiple of a tile's rows: those of 32 queries take 24 KiB of a core's first
-/// cache.
+/// Tokens whose scores are held at a time, a multiple of a tile's rows: the scores of 32 queries take 24 KiB of a core's
+/// L1 cache.
 pub(super) const TOKENS: usize = 32 * ROWS;
 
-/// Attends; see [`attention`](crate::attention::attention).
+/// Computes attention; see [`attention`](crate::attention::attention).
 ///
-/// Keys and values are read where they lie: the scores are computed as `K Qᵀ`, one column a query, which is how the second
-/// product `Vᵀ P` wants them.
+/// Keys and values are read in place: the scores are computed as `K Qᵀ`, with one column per query, which is the layout
+/// that the second product `Vᵀ P` needs.
 ///
 /// # Shapes
 ///
-/// - `query`: `[batch, tokens, channels]`; `key`, `value`: `[batch, tokens seen, channels]`
-/// - result: as `query`, and the softmaxes `[batch, tokens, heads]`
+/// - `query`: `[batch, tokens, channels]`; `key`, `value`: `[batch, tokens of the context, channels]`
+/// - result: as `query`, and the softmax statistics `[batch, tokens, heads]`
 ///
 /// # References
 ///
-/// Dao et al. (2022), "Fast and Memory-Efficient Exact Attention", algorithm 1 (the largest score so far, and sums that are
-/// scaled whenever it grows).
+/// Dao et al. (2022), "Fast and Memory-Efficient Exact Attention", algorithm 1 (running maximum of the scores, with sums
+/// rescaled whenever it grows).
 pub(crate) fn attend(
     query: &[f32],
     key: &[f32],
@@ -69,14 +69,14 @@ pub(crate) struct Softmax {
     pub(super) inverse: f32,
 }
 
-/// At most a tile's width of queries of one head.
+/// Queries of one head, at most a tile's width of them.
 struct Forward<'a> {
-    /// Of the queries, as many apart as there are heads.
+    /// Statistics of the queries, as far apart as there are heads.
     softmaxes: &'a mut [Softmax],
     query: Rows<'a>,
     key: Rows<'a>,
     value: Rows<'a>,
-    /// Place of the first query in its sequence.
+    /// Position of the first query in its sequence.
     first: usize,
     shape: &'a Shape,
     out: &'a mut [f32],
@@ -90,7 +90,7 @@ impl WithSimd for Forward<'_> {
         let (width, depth) = (tile::width::<S>(), self.shape.depth());
         let query = self.query.pack_transposed(depth, width);
         let mut scores = vec![0.0; TOKENS.min(self.key.count) * width];
-        // Of each query: what it gets, the largest score, the sum of exponentials.
+        // For each query: the weighted sum of values, the largest score and the sum of exponentials.
         let mut sums = vec![0.0; depth * width];
         let mut largest = vec![f32::NEG_INFINITY; width];
         let mut totals = vec![0.0; width];
@@ -153,7 +153,7 @@ pub(super) fn products<S: Simd>(simd: S, key: &Rows<'_>, query: &[f32], scores: 
     }
 }
 
-/// Hides tokens after their query.
+/// Masks tokens after their query.
 fn hide(scores: &mut [f32], width: usize, first_token: usize, first_query: usize) {
     for (k, scores) in scores.chunks_exact_mut(width).enumerate() {
         let before = (first_token + k).saturating_sub(first_query).min(width);
@@ -161,8 +161,8 @@ fn hide(scores: &mut [f32], width: usize, first_token: usize, first_query: usize
     }
 }
 
-/// Replaces each x by `e^(s (x − m))`, m the largest of its query so far; what the query had before has to be multiplied
-/// with what is returned.
+/// Replaces each x by `e^(s (x − m))`, where m is the largest score of its query so far, and returns the factors by which
+/// the earlier sums of each query must be multiplied.
 #[inline(always)]
 fn exponentials<S: Simd>(
     scores: &mut [f32],
@@ -181,7 +181,7 @@ fn exponentials<S: Simd>(
         *shrunk = exp((*shrunk - max) * scale);
         *total *= *shrunk;
     }
-    // Block by block, so that no running sum is long.
+    // Block by block, to keep running sums short.
     for block in scores.chunks_mut(TOKENS * width) {
         let mut sums = vec![0.0; width];
         for row in block.chunks_exact_mut(width) {
@@ -208,7 +208,7 @@ pub(super) fn add_values<S: Simd>(
 ) {
     let width = tile::width::<S>();
     for first in (0..depth).step_by(ROWS) {
-        // The last tile begins earlier, where there is room, and keeps what is new alone.
+        // The last tile starts earlier where possible, and only its new rows are kept.
         let from = first.min(depth.saturating_sub(ROWS));
         let mut tile = tile::start(simd, [0.0; ROWS]);
         tile::multiply_columns(

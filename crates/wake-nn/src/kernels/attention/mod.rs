@@ -1,5 +1,4 @@
-//! Attention of several heads, forward and backward, a block of queries at a time: the matrix of
-//! scores never exists as a whole.
+//! Multi-head attention, forward and backward, one block of queries at a time: the full matrix of scores is never stored.
 
 use rayon::prelude::*;
 
@@ -20,9 +19,9 @@ pub(crate) struct Shape {
     pub(crate) heads: usize,
     /// Channels of all heads.
     pub(crate) channels: usize,
-    /// Tokens that ask, and tokens that are seen.
+    /// Number of query tokens, and of tokens that they attend to.
     pub(crate) tokens: [usize; 2],
-    /// Whether token i sees only tokens 0…i.
+    /// Whether token i attends only to tokens 0…i.
     pub(crate) causal: bool,
 }
 
@@ -124,7 +123,7 @@ mod tests {
             let (ours, _) = attend(&q, &k, &v, &shape);
             let exact = exact([&wide(&q), &wide(&k), &wide(&v)], &shape);
             for (ours, exact) in ours.iter().zip(exact) {
-                // Scores below 16 are off by 16 · 34 · 2⁻²⁴ at most, and so are the weights, relatively.
+                // Scores below 16 are off by at most 16 · 34 · 2⁻²⁴, and so are the weights, relatively.
                 assert!(
                     (f64::from(*ours) - exact).abs() < 2.0 * 16.0 * 34.0 * 6e-8,
                     "{shape:?}"
@@ -133,7 +132,7 @@ mod tests {
         }
     }
 
-    /// Scores of ±10⁴: the largest wins, and nothing overflows.
+    /// With scores of ±10⁴ the largest wins, and nothing overflows.
     #[test]
     fn the_largest_score_wins() {
         let shape = shape((1, 1, 1, [2, 2], false));
@@ -166,7 +165,7 @@ mod tests {
                             .sum::<f64>()
                     };
                     let slope = (at(1e-5) - at(-1e-5)) / 2e-5;
-                    // Of order 1, sums of some hundred terms in f32.
+                    // Gradients are of order 1, and sums of some hundred terms in f32.
                     let error = (f64::from(ours[i]) - slope).abs();
                     assert!(error < 1e-5, "{shape:?} {input} {i}: {} {slope}", ours[i]);
                 }

@@ -1,4 +1,4 @@
-//! The convolution by the sum that defines it, for any kernel and stride.
+//! Convolution by its defining sum, for any kernel and stride.
 
 use pulp::{Simd, WithSimd};
 
@@ -10,13 +10,13 @@ use super::layout::{Gather, Layout};
 use crate::kernels::columns::columns;
 use crate::kernels::tile::{self, ROWS};
 
-/// Rows of a panel of patches that are multiplied at once: 16 columns of them are 32 KiB.
+/// Rows of a panel of patches that are multiplied at once: 16 columns of them take 32 KiB.
 const DEPTH: usize = 512;
 
-/// Most panels that share one pass over the weights.
+/// Largest number of panels that share one pass over the weights.
 const PANELS: usize = 8;
 
-/// Convolves a batch of images, with shapes as of [`convolve`](super::convolve).
+/// Convolves a batch of images, with the shapes of [`convolve`](super::convolve).
 pub(super) fn convolve(
     x: &[f32],
     weight: &[f32],
@@ -46,11 +46,11 @@ pub(super) fn convolve(
     y
 }
 
-/// Computes some images at a time in blocks of consecutive pixels of all their channels, on all cores.
+/// Computes a few images at a time, in blocks of consecutive pixels of all their channels, on all cores.
 ///
 /// - `planes`: the laid-out images
-/// - `images`, `block`: images at a time, and pixels of each in a block
-/// - `task`: given the planes of these images, the number of a block in them, and the block's part by image and channel
+/// - `images`, `block`: number of images at a time, and pixels of each in a block
+/// - `task`: called with the planes of these images, the number of a block in them, and the block's pixels by image and channel
 pub(super) fn by_blocks(
     y: &mut [f32],
     planes: &[f32],
@@ -69,7 +69,7 @@ pub(super) fn by_blocks(
         });
 }
 
-/// Pixels of one task: few enough that every core has work, many enough to reuse the weights.
+/// Pixels per task: few enough to give every core work, many enough to reuse the weights.
 fn block_width(geometry: &Geometry, width: usize) -> usize {
     let panels = geometry.pixels_out().div_ceil(width);
     let tasks = 4 * rayon::current_num_threads();
@@ -112,7 +112,7 @@ impl WithSimd for Block<'_> {
 }
 
 impl Block<'_> {
-    /// Writes the patches of one tile's pixels: for every channel and tap, a row of pixels.
+    /// Writes the patches of one tile's pixels: a row of pixels for every channel and tap.
     #[inline(always)]
     fn pack<S: Simd>(&self, channels: std::ops::Range<usize>, first: usize, panel: &mut [f32]) {
         let gather = Gather::new::<S>(&self.layout, self.geometry, self.first + first);
@@ -124,7 +124,7 @@ impl Block<'_> {
         }
     }
 
-    /// Adds the product of `depth` columns of the weights, from `start` on, with the patches.
+    /// Adds the product of `depth` columns of the weights, beginning at `start`, with the patches.
     #[inline(always)]
     fn multiply<S: Simd>(&mut self, simd: S, start: usize, patches: &[f32], depth: usize) {
         let width = tile::width::<S>();

@@ -3,11 +3,11 @@
 /// Sizes of a convolution with a square kernel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Geometry {
-    /// Images.
+    /// Number of images.
     pub(crate) batch: usize,
     /// Channels in and out.
     pub(crate) channels: [usize; 2],
-    /// Rows and columns of the image that comes in.
+    /// Rows and columns of the input image.
     pub(crate) size: [usize; 2],
     /// Rows and columns of the kernel.
     pub(crate) kernel: usize,
@@ -18,7 +18,7 @@ pub(crate) struct Geometry {
 }
 
 impl Geometry {
-    /// Rows and columns of the image that goes out.
+    /// Rows and columns of the output image.
     pub(crate) fn size_out(&self) -> [usize; 2] {
         let [top, left, bottom, right] = self.border;
         let out = |size, border| (size + border - self.kernel) / self.stride + 1;

@@ -1,14 +1,14 @@
-//! Gradient of a convolution to its image: a convolution with turned kernels, or the transposed product.
+//! Gradient of a convolution with respect to its image: a convolution with rotated kernels, or the transposed product.
 
 use rayon::prelude::*;
 
 use super::geometry::Geometry;
 use super::{convolve, scatter, tiles};
 
-/// Below so many channels out the terms of the transposed product take longer to write and read than to compute.
+/// Below this many output channels, the terms of the transposed product take longer to write and read than to compute.
 const FEW: usize = 16;
 
-/// Gradient to the image.
+/// Gradient with respect to the image.
 ///
 /// ```text
 /// ∂L/∂x[c, q] = Σ_{o, t} weight[o, c, t] · dy[o, p],   p · stride + t − border = q
@@ -29,7 +29,7 @@ pub(crate) fn image_gradient(dy: &[f32], weight: &[f32], geometry: &Geometry) ->
     scatter::image_gradient(dy, weight, geometry)
 }
 
-/// The convolution of the output's gradient, of a convolution of stride 1.
+/// Geometry of the convolution that maps the output's gradient to the image's, for stride 1.
 pub(super) fn turned(geometry: &Geometry) -> Geometry {
     let [top, left, ..] = geometry.border;
     let size_out = geometry.size_out();
@@ -43,7 +43,7 @@ pub(super) fn turned(geometry: &Geometry) -> Geometry {
     }
 }
 
-/// Swaps channels in and out, and turns every kernel by half a circle.
+/// Swaps input and output channels, and rotates every kernel by half a turn.
 pub(super) fn turn(weight: &[f32], geometry: &Geometry) -> Vec<f32> {
     let [channels_in, channels_out] = geometry.channels;
     let taps = geometry.kernel * geometry.kernel;

@@ -6,10 +6,10 @@ use rayon::prelude::*;
 use super::geometry::Geometry;
 use crate::kernels::tile;
 
-/// Where things are in a laid-out plane.
+/// Positions in a laid-out plane.
 ///
-/// A padded row i = q · stride + phase goes to row q of that phase, columns likewise, so that one tap
-/// of the kernel reads consecutive pixels whatever the stride.
+/// A padded row i = q · stride + phase goes to row q of that phase, likewise for columns, so one tap
+/// of the kernel reads consecutive pixels for any stride.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Layout {
     /// Rows and columns of one phase.
@@ -33,19 +33,19 @@ impl Layout {
         self.stride * self.stride * self.phase[0] * self.phase[1]
     }
 
-    /// Where the first output pixel reads through a tap (row · kernel + column).
+    /// Position at which the first output pixel reads through a tap (row · kernel + column).
     pub(super) fn tap(&self, tap: usize) -> usize {
         let (row, column) = (tap / self.kernel, tap % self.kernel);
         let phase = row % self.stride * self.stride + column % self.stride;
         phase * self.phase[0] * self.phase[1] + self.pixel(row / self.stride, column / self.stride)
     }
 
-    /// How far an output pixel is from the first.
+    /// Offset of an output pixel from the first.
     pub(super) fn pixel(&self, row: usize, column: usize) -> usize {
         row * self.phase[1] + column
     }
 
-    /// How far an output, counted over all images, is from the first of the first image.
+    /// Offset of an output, counted over all images, from the first output of the first image.
     pub(super) fn output(&self, output: usize, geometry: &Geometry) -> usize {
         let columns = geometry.size_out()[1];
         let (image, pixel) = (
@@ -55,7 +55,7 @@ impl Layout {
         image * geometry.channels[0] * self.plane() + self.pixel(pixel / columns, pixel % columns)
     }
 
-    /// Row and column in the laid-out plane of a pixel of the padded image, if any output sees it.
+    /// Position in the laid-out plane of a pixel of the padded image, if any output reads it.
     fn place(&self, row: usize, column: usize) -> Option<usize> {
         let (r, c) = (row / self.stride, column / self.stride);
         let phase = row % self.stride * self.stride + column % self.stride;
@@ -99,7 +99,7 @@ impl Layout {
             let plane = &mut plane[begin..begin + room];
             let values = &x[skipped.min(x.len())..];
             if self.stride == 2 {
-                // Vectors of pairs, which a step that is not known before does not give.
+                // Pairs become vector instructions, which a step known only at run time does not.
                 let (pairs, last) = values.as_chunks::<2>();
                 let values = pairs.iter().map(|pair| pair[0]);
                 for (place, value) in plane.iter_mut().zip(values) {
@@ -117,18 +117,18 @@ impl Layout {
     }
 }
 
-/// Reads the pixels that some consecutive outputs see through the taps of a kernel.
+/// Reads the pixels that consecutive outputs need through the taps of a kernel.
 #[derive(Debug)]
 pub(super) struct Gather {
     taps: Vec<usize>,
     pixels: Vec<usize>,
-    /// Whether all pixels follow one another, or those of each vector do.
+    /// Whether all pixels are consecutive, or those of each vector are.
     whole: bool,
     halves: bool,
 }
 
 impl Gather {
-    /// For one tile of outputs from the `first` on, which is counted over all images; beyond the last, the last again.
+    /// Prepares one tile of outputs, from the `first`, counted over all images; beyond the last output, the last is repeated.
     pub(super) fn new<S: Simd>(layout: &Layout, geometry: &Geometry, first: usize) -> Self {
         let last = geometry.batch * geometry.pixels_out() - 1;
         let pixels: Vec<usize> = (0..tile::width::<S>())
@@ -145,7 +145,7 @@ impl Gather {
         }
     }
 
-    /// Reads one laid-out plane of every image, the first of which is `plane`'s beginning: `[tap, pixel]`.
+    /// Reads one laid-out plane of every image as `[tap, pixel]`; `plane` begins with the plane of the first image.
     #[inline(always)]
     pub(super) fn read<S: Simd>(&self, plane: &[f32], rows: &mut [f32]) {
         let width = tile::width::<S>();

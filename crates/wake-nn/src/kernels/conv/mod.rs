@@ -1,8 +1,8 @@
 //! Convolution of images with square kernels, and its gradients, as matrix products.
 //!
-//! Each image is first laid out so that every tap of the kernel reads consecutive pixels: with its
-//! border, and split by the phase of a stride. All three products then run over that layout without
-//! ever writing the matrix of patches.
+//! Each image is first laid out with its border and split by the phase of the stride, so that every
+//! tap of the kernel reads consecutive pixels. All three products then run over that layout without
+//! ever storing the matrix of patches.
 
 mod direct;
 mod geometry;
@@ -16,13 +16,13 @@ pub(crate) use geometry::Geometry;
 pub(crate) use image::image_gradient;
 pub(crate) use weights::bias_gradient;
 
-/// Convolves a batch of images, by tiles where that saves products and directly elsewhere.
+/// Convolves a batch of images, by tiles where that saves products and directly otherwise.
 ///
 /// ```text
 /// y[o, p] = bias[o] + Σ_{c, t} weight[o, c, t] · x[c, p · stride + t − border]
 /// ```
 ///
-/// Tiles round more often than the direct sum: windows and kernels are sums before they are multiplied.
+/// Tiles round more often than the direct sum, because windows and kernels are summed before they are multiplied.
 ///
 /// # Shapes
 ///
@@ -43,7 +43,7 @@ pub(crate) fn convolve(
     }
 }
 
-/// Gradient to the weights, by tiles where that saves products and directly elsewhere.
+/// Gradient with respect to the weights, by tiles where that saves products and directly otherwise.
 ///
 /// ```text
 /// ∂L/∂weight[o, c, t] = Σ_{n, p} dy[n, o, p] · x[n, c, p · stride + t − border]

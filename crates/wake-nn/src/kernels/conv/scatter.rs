@@ -1,8 +1,8 @@
-//! Gradient of a convolution to its image by the transposed product: the contribution of every tap is computed for all outputs, and
-//! added to the pixel that the tap reads.
+//! Gradient of a convolution with respect to its image by the transposed product: the contribution of every tap is
+//! computed for all outputs and added to the pixel that the tap reads.
 //!
-//! The weights are read once, in the order of their tensor. Turned kernels need a copy of them, which takes longer than the product
-//! itself where an image is small.
+//! The weights are read once, in the order of their tensor. Rotated kernels need a copy of them, which takes longer than
+//! the product itself for a small image.
 
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
@@ -12,15 +12,14 @@ use crate::kernels::arch::arch;
 use crate::kernels::columns::columns;
 use crate::kernels::tile::{self, ROWS};
 
-/// Channels of the image that are one core's work at a time: those of 1280 channels out and nine taps take 720 KiB of a core's
-/// second cache.
+/// Image channels per task: with 1280 output channels and nine taps, their weights take 720 KiB of a core's L2 cache.
 const CHANNELS: usize = 16;
-/// Channels out that are multiplied at a time: a tile of outputs takes 24 KiB with the widest vectors.
+/// Output channels that are multiplied at a time: a tile of outputs takes 24 KiB with the widest vectors.
 const DEPTH: usize = 192;
 /// Tiles of outputs at a time.
 const TILES: usize = 8;
 
-/// Gradient to the image, with shapes as of [`image_gradient`](super::image_gradient).
+/// Gradient with respect to the image, with the shapes of [`image_gradient`](super::image_gradient).
 ///
 /// ```text
 /// G[c, t, p] = Σ_o weight[o, c, t] · dy[o, p],    ∂L/∂x[c, p · stride + t − border] += G[c, t, p]
@@ -46,7 +45,7 @@ pub(super) fn image_gradient(dy: &[f32], weight: &[f32], geometry: &Geometry) ->
     dx
 }
 
-/// The outputs of all images, tile by tile: `[tile, channel out, output]`; beyond the last, zeros.
+/// Packs the outputs of all images tile by tile: `[tile, channel out, output]`, padded with zeros.
 fn packed(dy: &[f32], geometry: &Geometry, width: usize) -> Vec<f32> {
     let (pixels, channels) = (geometry.pixels_out(), geometry.channels[1]);
     let outputs = geometry.batch * pixels;
@@ -120,7 +119,7 @@ impl WithSimd for Share<'_> {
 }
 
 impl Share<'_> {
-    /// The weights of these channels by tiles of rows (channel, tap): `[tile, channel out, row]`; beyond the last, zeros.
+    /// Packs the weights of these channels by tiles of rows (channel, tap): `[tile, channel out, row]`, padded with zeros.
     fn left(&self) -> Vec<f32> {
         let (patch, channels) = (self.geometry.patch(), self.geometry.channels[1]);
         let taps = self.geometry.kernel * self.geometry.kernel;
@@ -136,7 +135,7 @@ impl Share<'_> {
         left
     }
 
-    /// Adds the products `[channel, tap, output]` of one tile of outputs, from the `first` of all images, to their pixels.
+    /// Adds the products `[channel, tap, output]` of one tile of outputs to their pixels; `first` counts over all images.
     #[inline(always)]
     fn scatter(&mut self, first: usize, products: &[f32], width: usize) {
         let Geometry {
@@ -161,7 +160,8 @@ impl Share<'_> {
                     let Some(row) = (row * stride + tap / kernel).checked_sub(top) else {
                         continue;
                     };
-                    // Outputs whose tap sees a column of the image: from the first not before it to the last not beyond.
+                    // Outputs whose tap reads a column of the image: from the first inside its left edge to the last
+                    // inside its right.
                     let shift = tap % kernel;
                     let from = left.saturating_sub(shift).div_ceil(stride).max(column);
                     let to = (columns + left).saturating_sub(shift).div_ceil(stride);

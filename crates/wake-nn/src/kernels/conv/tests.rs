@@ -1,10 +1,10 @@
-//! Every product against the sum that defines it.
+//! Every product against its defining sum.
 
 use super::image::{turn, turned};
 use super::*;
 use crate::kernels::noise;
 
-/// Sums in f64 and the sums of their terms' sizes, from which the rounding follows.
+/// Sums in f64, each with the sum of its terms' absolute values, from which the rounding error follows.
 struct Oracle {
     y: Vec<[f64; 2]>,
     dx: Vec<[f64; 2]>,
@@ -53,7 +53,7 @@ fn oracle(x: &[f32], weight: &[f32], dy: &[f32], g: &Geometry) -> Oracle {
     oracle
 }
 
-/// A sum of n products in f32 is off by at most n · 2⁻²⁴ times the sum of their sizes.
+/// Asserts that sums of n products in f32 are off by at most n · 2⁻²⁴ times the sum of the products' absolute values.
 fn assert_near(what: &str, ours: &[f32], exact: &[[f64; 2]], terms: usize) {
     assert_eq!(ours.len(), exact.len(), "{what}");
     for (i, (ours, [exact, size])) in ours.iter().zip(exact).enumerate() {
@@ -63,7 +63,7 @@ fn assert_near(what: &str, ours: &[f32], exact: &[[f64; 2]], terms: usize) {
     }
 }
 
-/// Widths that fill tiles and that do not, odd sizes, strides, lopsided borders, kernels of 1, 2, 3
+/// Widths that fill tiles and widths that do not, odd sizes, strides, unequal borders, kernels of 1, 2, 3
 /// and 5, more channels than one block of the product takes.
 #[test]
 fn products_are_the_sums_that_define_them() {
@@ -114,7 +114,7 @@ fn products_are_the_sums_that_define_them() {
     }
 }
 
-/// What the transforms of tiles add up, signs left out: places of windows, rows of kernels, products.
+/// Absolute values of the tiles' matrices `Bᵀ` (windows), `G` (kernels) and `Aᵀ` (products).
 const B: [[f64; 4]; 4] = [
     [1., 0., 1., 0.],
     [0., 1., 1., 0.],
@@ -124,7 +124,7 @@ const B: [[f64; 4]; 4] = [
 const G: [[f64; 3]; 4] = [[1., 0., 0.], [0.5, 0.5, 0.5], [0.5, 0.5, 0.5], [0., 0., 1.]];
 const A: [[f64; 4]; 2] = [[1., 1., 1., 0.], [0., 1., 1., 1.]];
 
-/// Sizes of the transformed windows of an image: `[image, tile, channel, place]`.
+/// Bounds of the transformed windows of an image, from absolute values: `[image, tile, channel, place]`.
 fn sizes_of_windows(x: &[f32], g: &Geometry) -> Vec<[f64; 16]> {
     let ([channels, _], [rows, columns]) = (g.channels, g.size);
     let pixel = |n: usize, c: usize, row: usize, column: usize| {
@@ -152,10 +152,10 @@ fn sizes_of_windows(x: &[f32], g: &Geometry) -> Vec<[f64; 16]> {
     sizes
 }
 
-/// The most that rounding can change of a convolution by tiles: every number that is summed, and how many roundings it sees.
+/// Bound on the rounding error of a convolution by tiles: absolute values of all terms times their numbers of roundings.
 ///
-/// A kernel's transform rounds at most four times, a window's two, the product once, its sum once a channel, the pixel's
-/// four times, the bias once.
+/// A kernel's transform rounds at most four times, a window's twice, the product once, its sum once per channel, the
+/// pixel's transform four times, and the bias once.
 fn rounding_of_tiles(x: &[f32], weight: &[f32], g: &Geometry) -> Vec<f64> {
     let [channels_in, channels_out] = g.channels;
     let windows = sizes_of_windows(x, g);
@@ -194,10 +194,10 @@ fn rounding_of_tiles(x: &[f32], weight: &[f32], g: &Geometry) -> Vec<f64> {
     bounds
 }
 
-/// The most that rounding can change of a gradient to weights by tiles.
+/// Bound on the rounding error of a weight gradient by tiles.
 ///
-/// A window's transform rounds at most twice, that of the tile's gradient too, the product once, its sum once a tile, the kernel's
-/// four times.
+/// The transforms of a window and of a tile's gradient each round at most twice, the product once, its sum once per tile,
+/// and the kernel's transform four times.
 fn rounding_of_weights(x: &[f32], dy: &[f32], g: &Geometry) -> Vec<f64> {
     let [channels_in, channels_out] = g.channels;
     let windows = sizes_of_windows(x, g);
@@ -239,8 +239,8 @@ fn rounding_of_weights(x: &[f32], dy: &[f32], g: &Geometry) -> Vec<f64> {
     bounds
 }
 
-/// Sides that tiles fill and do not, lopsided borders, channels that rows of a product do not divide, panels of several rows
-/// of tiles, several panels a task, more of them than stay near, and panels of several small images.
+/// Sides that tiles fill and do not fill, unequal borders, channels that are not multiples of a product's rows, panels of
+/// several rows of tiles, several panels per task, more panels than the cache holds, and panels of several small images.
 #[test]
 fn tiles_give_the_sums_that_define_them() {
     let cases = [
@@ -292,7 +292,7 @@ fn tiles_give_the_sums_that_define_them() {
     }
 }
 
-/// Sums and what is added to them, within their bounds and one rounding of what is added.
+/// Asserts that sums plus added values are within their bounds and one rounding of the added values.
 fn assert_within(what: &str, ours: &[f32], exact: &[[f64; 2]], added: &[f32], bounds: &[f64]) {
     assert_eq!(ours.len(), exact.len(), "{what}");
     for (i, ours) in ours.iter().enumerate() {
@@ -362,8 +362,8 @@ fn ulps(y: &[f32], x: &[f32], weight: &[f32], g: &Geometry) -> f64 {
     (errors / squares).sqrt() / f64::from(f32::EPSILON)
 }
 
-/// Milliseconds on one core and errors, of `cargo test --release -p wake-nn --features autodiff --lib conv::tests::times -- --ignored
-/// --nocapture`.
+/// Prints times in milliseconds on one core, and errors. Run with
+/// `cargo test --release -p wake-nn --features autodiff --lib conv::tests::times -- --ignored --nocapture`.
 #[test]
 #[ignore = "prints the milliseconds of docs/reports/performance.md, wants an idle machine, and has nothing to check"]
 #[expect(clippy::print_stdout, reason = "what it is for")]

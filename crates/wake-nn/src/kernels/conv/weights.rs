@@ -1,4 +1,4 @@
-//! Gradients of a convolution to its weights, by the sum that defines them, and to its bias.
+//! Gradients of a convolution with respect to its weights, by the defining sum, and to its bias.
 
 use pulp::{Simd, WithSimd};
 
@@ -10,7 +10,7 @@ use super::layout::Layout;
 use crate::kernels::sum::sum;
 use crate::kernels::tile::{self, ROWS};
 
-/// Gradient to the weights, with shapes as of [`weight_gradient`](super::weight_gradient).
+/// Gradient with respect to the weights, with the shapes of [`weight_gradient`](super::weight_gradient).
 pub(super) fn weight_gradient(x: &[f32], dy: &[f32], geometry: &Geometry) -> Vec<f32> {
     let layout = Layout::new(geometry);
     let planes = layout.lay_out(x, geometry);
@@ -37,7 +37,7 @@ pub(super) fn weight_gradient(x: &[f32], dy: &[f32], geometry: &Geometry) -> Vec
     transpose(&transposed, channels_out)
 }
 
-/// Gradient to the bias: `∂L/∂bias[o] = Σ_{n, p} dy[n, o, p]`.
+/// Gradient with respect to the bias: `∂L/∂bias[o] = Σ_{n, p} dy[n, o, p]`.
 ///
 /// # Shapes
 ///
@@ -55,7 +55,7 @@ pub(crate) fn bias_gradient(dy: &[f32], geometry: &Geometry) -> Vec<f32> {
         .collect()
 }
 
-/// Images of so many channels, rows and columns with a border of zeros, tile by tile: `[image, tile of channels, pixel, channel]`.
+/// Interleaves the channels of images, with a border of zeros: `[image, tile of channels, pixel, channel]`.
 pub(super) fn interleave(
     images: &[f32],
     channels: usize,
@@ -102,7 +102,7 @@ fn interleave_rows(rows: &[f32], step: usize, out: &mut [f32], width: usize) {
     }
 }
 
-/// `[n, columns]` to `[columns, n]`.
+/// Transposes `[n, columns]` to `[columns, n]`.
 fn transpose(matrix: &[f32], columns: usize) -> Vec<f32> {
     const SQUARE: usize = 16;
     let rows = matrix.len() / columns;
@@ -122,18 +122,18 @@ fn transpose(matrix: &[f32], columns: usize) -> Vec<f32> {
     out
 }
 
-/// Numbers of the output's gradient that should stay in a core's second cache: 192 KiB.
+/// Numbers of the output's gradient that should stay in a core's L2 cache: 192 KiB.
 const NEAR: usize = 48 * 1024;
 
 /// Some images, and the gradient of one tile of their output channels.
 struct Images<'a> {
     planes: &'a [f32],
     dy: &'a [f32],
-    /// From one image to the next in either.
+    /// Steps from one image to the next in `planes` and `dy`.
     steps: [usize; 2],
 }
 
-/// Some rows (channel in, tap) of the transposed gradient, which has a column per channel out.
+/// Some rows (channel in, tap) of the transposed gradient, which has one column per output channel.
 struct Share<'a> {
     planes: &'a [f32],
     dy: &'a [f32],
@@ -173,7 +173,7 @@ impl WithSimd for Share<'_> {
 }
 
 impl Share<'_> {
-    /// Adds what some images give, for one tile of output channels.
+    /// Adds the contribution of some images to one tile of output channels.
     #[inline(always)]
     fn add<S: Simd>(
         &mut self,
@@ -213,8 +213,7 @@ impl Share<'_> {
         }
     }
 
-    /// Where the rows of a tile begin to read: their channel, shifted by their tap; beyond the last
-    /// row, as the last.
+    /// Positions from which the rows of a tile read: their channel, shifted by their tap; beyond the last row, those of the last.
     fn reads(&self, tile: usize) -> [usize; ROWS] {
         let taps = self.geometry.kernel * self.geometry.kernel;
         let last = self.geometry.patch() - 1;

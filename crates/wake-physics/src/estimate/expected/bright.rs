@@ -1,7 +1,7 @@
-//! Covariances of what makes waves of the sea bright and what moves them: where bright waves are imaged.
+//! Covariances between the brightness and the velocity of the sea's waves, which set where bright waves are imaged.
 //!
-//! Slopes s, modulation m and velocity u of the waves at one place are Gaussian. A source is as bright as σ(s̄ + s) e^{m − ½⟨m²⟩}, so that the mean of
-//! what it returns and its mean velocity are
+//! Slopes s, modulation m and velocity u of the waves at one place are Gaussian. A source has the brightness σ(s̄ + s) e^{m −
+//! ½⟨m²⟩}; its mean and the mean of its product with the velocity are
 //!
 //! ```text
 //! E σ e^m   = σ̄(s̄ + ⟨s m⟩)                                   σ̄ the mean over s
@@ -26,7 +26,7 @@ pub(super) struct BrightWaves {
 }
 
 impl BrightWaves {
-    /// Of the resolved waves of a sea; of the terms that a plan uses.
+    /// Covariances over the resolved waves of a sea, for the terms that a plan uses.
     pub(super) fn new(models: &Models, plan: &Plan) -> Self {
         let mut sum = Self::default();
         let modulating = plan.uses(Term::Hydrodynamic);

@@ -1,11 +1,12 @@
-//! Mean σ⁰ of a facet by its slope and by wind and incidence: a spline with all its derivatives.
+//! Mean σ⁰ of a facet as a function of slope, wind and incidence: a spline with all its derivatives.
 //!
 //! ```text
 //! σ(s) = ∬ p(u) σ_facet(s + u) du      p Gaussian: the slopes of the whole sea
 //! ```
 //!
-//! The Bragg return of plane facets is computed on a lattice of slopes and convolved with p by its Fourier transform, so that the knots of the
-//! spline are points of the lattice; derivatives by the slope are those of the spline, derivatives by wind and incidence are central differences of all values.
+//! The Bragg return of plane facets is computed on a lattice of slopes and convolved with p by Fourier transform; the knots of
+//! the spline are points of the lattice. Derivatives by slope are derivatives of the spline; derivatives by wind and incidence
+//! are central differences of all values.
 
 use super::bright::BrightWaves;
 use crate::fft::{fast_length, signed_index};
@@ -16,58 +17,59 @@ use rustfft::{Fft, FftPlanner};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-/// Largest spacing of plane facets \[1\]: that of the first try of the table.
+/// Largest spacing of plane facets \[1\], the first spacing that the table of mean σ⁰ tries.
 const SPACING: f64 = 0.02;
 
 /// Step of the derivatives of the specular return by slope, in units of the covariance of slope and velocity.
 const STEP: f64 = 0.03;
 
-/// Standard deviations that an average looks at.
+/// Range of an average, in standard deviations.
 const REACH: f64 = 5.5;
 
-/// Values by which tables are differenced: wind speed, wind direction, incidence.
+/// Number of values by which tables are differenced: wind speed, wind direction, incidence.
 pub(super) const OUTER: usize = 3;
 
-/// Bragg return, specular return, both times the velocity of the waves, and both times what its square has beyond its variance.
+/// Number of parts: Bragg and specular return, both times the velocity u of the waves, and both times u² − ⟨u²⟩.
 const PARTS: usize = 6;
 
-/// Derivatives of the parts by the outer values.
+/// Number of derivatives of the parts by the outer values.
 const BY_OUTER: usize = PARTS * OUTER;
 
-/// Cells of the spline across the square of slopes, and beyond it on each side, where the conditions at its ends fade.
+/// Cells of the spline across the square of slopes, and beyond it on each side, where the end conditions decay.
 const CELLS: usize = 64;
 const BEYOND: usize = 6;
 
-/// σ⁰ as a cubic spline: twice differentiable, of fourth order in cells of a thirty-second of the reach.
+/// σ⁰ as a cubic spline: twice differentiable, fourth-order accurate in cells of a thirty-second of the reach.
 pub(super) struct CrossSection {
-    /// Half the side of the square of slopes that it covers \[1\].
+    /// Half the side of the square of slopes covered by the spline \[1\].
     reach: f64,
-    /// Coefficients of B-splines, `[side, side]`, that of the slope along x running fastest.
+    /// B-spline coefficients, `[side, side]`, with the slope along x running fastest.
     parts: Vec<[f64; PARTS]>,
-    /// The same of their derivatives by the outer values, if there are any.
+    /// Coefficients of the derivatives by the outer values, empty if there are none.
     by_outer: Vec<[f64; BY_OUTER]>,
 }
 
-/// Coefficients along each axis.
+/// Number of coefficients along each axis.
 const SIDE: usize = CELLS + 2 * BEYOND + 1;
 
-/// σ⁰ at one slope: Bragg and specular, the means of both times the velocity u toward the radar of the waves of the sea \[m/s\], and of both times u² − ⟨u²⟩.
+/// σ⁰ at one slope: Bragg and specular return, and the means of both times u and times u² − ⟨u²⟩, with u the velocity of the
+/// sea's waves toward the radar \[m/s\].
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct At {
     pub(super) value: [f64; PARTS],
-    /// By the slopes along x and y.
+    /// Derivatives by the slopes along x and y.
     pub(super) slope: [[f64; 2]; PARTS],
-    /// By wind speed, wind direction and incidence.
+    /// Derivatives by wind speed, wind direction and incidence.
     pub(super) outer: [[f64; OUTER]; PARTS],
 }
 
-/// Plane facets and the sea that they are on.
+/// Backscatter of plane facets, and the covariances of the sea's waves.
 pub(super) type Facets = (Backscatter, BrightWaves);
 
 impl CrossSection {
     /// σ⁰ over the square of slopes up to `reach`.
     ///
-    /// - `outer`: for each outer value σ⁰ at a step below and above, and twice the step; `None` for no derivative
+    /// - `outer`: for each outer value, σ⁰ one step below and above it, and twice the step; `None` for no derivative
     pub(super) fn new(
         here: &Facets,
         outer: &[Option<([&Facets; 2], f64)>; OUTER],
@@ -110,9 +112,9 @@ impl CrossSection {
         }
     }
 
-    /// σ⁰ at a slope; steeper slopes than the spline covers are taken as its edge.
+    /// σ⁰ at a slope; slopes beyond the spline are clamped to its edge.
     ///
-    /// - `BY`: with derivatives
+    /// - `BY`: with derivatives by the outer values
     #[inline(always)]
     pub(super) fn at<const BY: bool>(&self, slope: [f64; 2]) -> At {
         let per = CELLS as f64 / (2.0 * self.reach);
@@ -181,7 +183,7 @@ fn spline_weights(t: f64) -> [[f64; 4]; 2] {
     ]
 }
 
-/// B-spline coefficients in place of the values at the knots: the inverse of 1/6, 4/6, 1/6 along both axes.
+/// Replaces values at the knots by B-spline coefficients: the inverse of 1/6, 4/6, 1/6 along both axes.
 fn spline<const CHANNELS: usize>(knots: &mut [[f64; CHANNELS]]) {
     if knots.is_empty() {
         return;
@@ -200,7 +202,7 @@ fn spline<const CHANNELS: usize>(knots: &mut [[f64; CHANNELS]]) {
     }
 }
 
-/// Solves (c₋ + 4c + c₊)/6 = value along a line, its ends left as they are.
+/// Solves (c₋ + 4c + c₊)/6 = value along a line, leaving its ends unchanged.
 fn unsmooth(values: &mut [f64]) {
     let last = values.len() - 1;
     let mut factor = vec![0.0; last];
@@ -218,14 +220,14 @@ fn unsmooth(values: &mut [f64]) {
 struct Lattice {
     side: usize,
     spacing: f64,
-    /// Points from knot to knot.
+    /// Steps of the lattice from knot to knot.
     finer: usize,
     forward: Arc<dyn Fft<f64>>,
     inverse: Arc<dyn Fft<f64>>,
 }
 
 impl Lattice {
-    /// - `widest` standard deviation of the averages
+    /// - `widest`: largest standard deviation of the averages
     fn new(reach: f64, widest: f64) -> Self {
         let cell = 2.0 * reach / CELLS as f64;
         let finer = (cell / SPACING).ceil().max(1.0) as usize;
@@ -242,7 +244,7 @@ impl Lattice {
         }
     }
 
-    /// Point of the lattice at a knot.
+    /// Index of the lattice point at a knot.
     fn at_knot(&self, n: usize) -> usize {
         self.side / 2 + n * self.finer - SIDE / 2 * self.finer
     }
@@ -252,7 +254,7 @@ impl Lattice {
         (n as f64 - (self.side / 2) as f64) * self.spacing
     }
 
-    /// The parts at the knots, the one along x running fastest.
+    /// The parts at the knots, with the slope along x running fastest.
     fn averages(&self, (backscatter, waves): &Facets) -> Vec<[f64; PARTS]> {
         let side = self.side;
         let mut facets = vec![0.0; side];
@@ -329,7 +331,7 @@ mod tests {
     use super::*;
     use crate::scene::Scene;
 
-    /// Splines of polynomials have their values and derivatives.
+    /// The spline of a polynomial has its values and derivatives.
     #[test]
     fn the_spline_is_the_polynomial() {
         let (t3, t2) = (
@@ -399,7 +401,8 @@ mod tests {
                 let first = (above - below) / (2.0 * step);
                 let second = (above - 2.0 * here + below) / (step * step);
                 let c = [waves.velocity_modulation, 0.0][n];
-                // Differences over 0.0014 of a slope, of σ⁰ that changes by its own size over 0.04: 1e-3 of each derivative.
+                // Differences over a slope of 0.0014 where σ⁰ changes by its own size over 0.04: errors of 1e-3 of each
+                // derivative.
                 let close = |found: f64, expected: f64, unit: f64| {
                     let allowed = 1e-3 * (expected.abs() + unit);
                     assert!((found - expected).abs() < allowed, "{found} {expected}");
@@ -415,7 +418,7 @@ mod tests {
         }
     }
 
-    /// The mean σ⁰ is the one by direct quadrature.
+    /// The mean σ⁰ agrees with direct quadrature.
     #[test]
     fn it_is_the_exact_cross_section() {
         for keys in [

@@ -12,26 +12,26 @@ use crate::numeric::Dual;
 use crate::sar::smooth::{Displacement, SMALLEST_VARIANCE, Source};
 use std::f64::consts::PI;
 
-/// Numbers of the first ship's place, with their derivatives by value.
+/// Position, direction and length of a ship, with derivatives by value.
 struct Place<const N: usize> {
     position: [Dual<N>; 2],
     forward: [Dual<N>; 2],
     length: Dual<N>,
 }
 
-/// Everything that pixels are computed from.
+/// Inputs from which the pixels are computed.
 pub(super) struct Drawn<'a, const N: usize> {
     surface: &'a Surface<'a>,
     cross_section: CrossSection,
     displacement: Displacement,
     raster: crate::Raster,
-    /// Ships, of which the first has derivatives.
+    /// Ships; only the first has derivatives.
     places: Vec<Place<N>>,
     columns_per_elevation: Dual<N>,
     variance: Dual<N>,
     sine: Dual<N>,
     effects: [Option<EffectField<'a, N>>; FIELDS],
-    /// Place of each value among the derivatives; beyond the last where there is no derivative.
+    /// Index of each value among the derivatives; past the last where there is no derivative.
     slots: [usize; Value::ALL.len()],
 }
 
@@ -54,7 +54,7 @@ impl<const N: usize> EffectField<'_, N> {
     }
 }
 
-/// Derivatives by one value, those of the fields aside.
+/// Derivatives of scalars by one value.
 #[derive(Clone, Copy, Default)]
 struct ValueSlopes {
     at: usize,
@@ -82,7 +82,7 @@ fn dual<const N: usize>(
 }
 
 impl Moved {
-    /// Derivatives by the value, those of the fields aside.
+    /// Derivatives of scalars by the value.
     fn slopes(&self, at: usize, displacement: impl Fn(&Models) -> Displacement) -> ValueSlopes {
         let ship = |of: fn(&crate::kelvin::KelvinWake) -> f64| {
             self.slope(|m| m.wakes.first().map_or(0.0, of))
@@ -205,7 +205,7 @@ impl<'a, const N: usize> Drawn<'a, N> {
         out
     }
 
-    /// What a pixel returns, and where that is imaged.
+    /// Power returned by a pixel, and where it is imaged.
     #[inline(always)]
     pub(super) fn source(&self, i: usize, j: usize) -> Source<N> {
         let pixel = i * self.raster.columns + j;
@@ -225,7 +225,7 @@ impl<'a, const N: usize> Drawn<'a, N> {
             }
             _ => [power, moving, spread],
         };
-        // Mean velocity of the sea's waves weighted with their brightness, and what the variance has beyond that of all waves.
+        // Brightness-weighted mean velocity of the sea's waves, and their variance in excess of that of all waves.
         let inverse = match power.value > 0.0 {
             true => power.map(power.value.recip(), -power.value.powi(-2)),
             false => Dual::constant(0.0),
@@ -254,9 +254,10 @@ impl<'a, const N: usize> Drawn<'a, N> {
         }
     }
 
-    /// σ⁰ without effects that change it as a whole, and its products of [`At`](super::cross_section::At) with the velocity of the sea's waves.
+    /// σ⁰ before the effects that change it as a whole, and its products with the velocity of the sea's waves, as in
+    /// [`At`](super::cross_section::At).
     ///
-    /// - `factor` on the Bragg return
+    /// - `factor`: factor on the Bragg return
     #[inline(always)]
     fn returned(&self, slope: [Dual<N>; 2], factor: impl FnOnce() -> Dual<N>) -> [Dual<N>; 3] {
         let point = slope.map(|s| s.value);

@@ -1,4 +1,4 @@
-//! What a plan chooses once for all scenes that differ by a few values, and their models.
+//! Choices of a plan that are made once for all scenes that differ by a few values, and the models of these scenes.
 
 use super::waves::Linear;
 use crate::linear::OpenSea;
@@ -9,26 +9,26 @@ use crate::sar::Imaging;
 use crate::scattering::Backscatter;
 use crate::scene::{Scene, Term};
 
-/// Choices that are frozen.
+/// Frozen choices of a plan.
 #[derive(Debug)]
 pub(super) struct Frozen {
     pub(super) plan: Plan,
     pub(super) ships: usize,
-    /// True for a mean over the waves of a sea.
+    /// True if the image is a mean over the waves of the sea.
     pub(super) over_seas: bool,
     /// Pixels with their margin.
     pub(super) raster: Raster,
     pub(super) fields: Vec<Linear>,
-    /// Waves of each ship that modulate.
+    /// For each ship, whether each wave modulates.
     pub(super) modulating: Vec<Vec<bool>>,
-    /// Steepest slope that σ⁰ is computed for.
+    /// Steepest slope for which σ⁰ is computed.
     pub(super) reach: f64,
-    /// Of sums of waves.
+    /// Tolerance of sums of waves.
     pub(super) tolerance: f64,
 }
 
 impl Frozen {
-    /// Backscatter of the terms of the plan.
+    /// Backscatter with the terms of the plan.
     pub(super) fn backscatter(&self, models: &Models) -> Backscatter {
         let uses = |term| self.plan.uses(term);
         models.backscatter(uses(Term::TiltAverage), uses(Term::Specular))
@@ -41,7 +41,7 @@ pub(super) fn averaged(scene: &Scene) -> Models {
     OpenSea::new(&models).averaged(&models)
 }
 
-/// What the radar does, by a plan.
+/// Imaging parameters of the radar for a plan.
 pub(super) fn imaging(models: &Models, plan: &Plan) -> Imaging {
     Imaging {
         range_to_velocity: models.range_to_velocity,
@@ -53,7 +53,7 @@ pub(super) fn imaging(models: &Models, plan: &Plan) -> Imaging {
     }
 }
 
-/// Models of a scene that differs from another by a ship's value.
+/// Models of a scene that differs from the scene of `models` only by values of its ships.
 pub(super) fn with_ships_of(scene: &Scene, models: &Models) -> Models {
     let wake = |ship| kelvin_wake(ship, scene.sea.depth, scene.sea.time);
     Models {

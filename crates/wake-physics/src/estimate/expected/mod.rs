@@ -5,8 +5,8 @@
 //!      └─► wind, sea ─► σ⁰(slope) ─► sources ─► bunching ─► response ─► intensity
 //! ```
 //!
-//! Every stage hands its derivatives on by the chain rule. What a plan chooses (terms, pixels, margin, nodes of the wake,
-//! steps of the kernel) is chosen once, for one scene: so the image is a smooth function of the values.
+//! Every stage passes its derivatives on by the chain rule. The choices of a plan (terms, pixels, margin, nodes of the wake,
+//! steps of the kernel) are made once, for one scene, so the image is a smooth function of the values.
 
 mod bright;
 mod cross_section;
@@ -34,15 +34,17 @@ use waves::Linear;
 /// The expected image of a scene, and its derivatives.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expected {
-    /// Mean over all seas of the intensity before speckle. It has the shift and blur by bright waves, which [`expected_intensity`](crate::expected_intensity) leaves out.
+    /// Mean over all seas of the intensity before speckle. Unlike [`expected_intensity`](crate::expected_intensity), it includes
+    /// the shift and blur by bright waves.
     pub intensity: Field,
-    /// Its derivative by each value, in the unit of σ⁰ per unit of the value.
+    /// Derivative by each value, in units of σ⁰ per unit of the value.
     pub derivatives: Vec<(Value, Field)>,
-    /// Contrast of the sources around a pixel, as far as waves of the sea move them \[1\]: variance of their intensity over the square of its mean.
+    /// Contrast of the sources within the distance over which waves of the sea displace them \[1\]: variance of their intensity
+    /// over the square of its mean.
     pub contrast: Field,
 }
 
-/// Expected images of scenes that differ by a few values, with what a plan chooses frozen at one of them.
+/// Expected images of scenes that differ by a few values, with the plan of one of them frozen.
 ///
 /// ```
 /// use wake_physics::Scene;
@@ -59,22 +61,22 @@ pub struct Expected {
 /// # Ok::<(), wake_physics::Error>(())
 /// ```
 ///
-/// # What is rounded
+/// # Approximations
 ///
-/// - The weights of range have rounded corners: at most 0.012 of a pixel's power moves to the next one.
+/// - The weights of range have rounded corners: at most 0.012 of a pixel's power moves to its neighbour.
 /// - σ⁰ is a spline of the slope, constant beyond 1.25 times the steepest slope of the frozen scene.
-/// - Derivatives of effects (turbulent wake, edges, gusts) and of σ⁰ by wind and incidence are differences of small stages,
-///   about 1e-5 of themselves off.
-/// - Waves cross no limit: those of the frozen band stay, and those that modulate.
+/// - Derivatives of effects (turbulent wake, edges, gusts) and of σ⁰ by wind and incidence are finite differences of single
+///   stages, with relative errors of about 1e-5.
+/// - The frozen band keeps its waves, and the waves that modulate stay the same.
 ///
 /// # Limits
 ///
-/// Ships that go straight, and a sea with wind. Echoes of ships and waves below the pixels ([`Term::SubpixelWake`]) are left out: these waves change within
-/// centimetres, and their value at the middle of a pixel has not the derivative of the pixel's mean.
+/// Ships on straight tracks only, and a sea with wind. Echoes of ships and waves below the pixels ([`Term::SubpixelWake`]) are
+/// left out: these waves change within centimetres, and the derivative at the middle of a pixel is not that of the pixel's mean.
 #[derive(Debug)]
 pub struct ExpectedImage {
     values: Vec<Value>,
-    /// Computed pixels, and pixels of the image.
+    /// Pixels that are computed, and pixels of the image.
     computed: Raster,
     image: Raster,
     frozen: Frozen,
@@ -85,15 +87,15 @@ pub struct ExpectedImage {
 ///
 /// # Errors
 ///
-/// As [`ExpectedImage::new`].
+/// As in [`ExpectedImage::new`].
 pub fn expected_with_derivatives(scene: &Scene, values: &[Value]) -> Result<Expected> {
     ExpectedImage::new(scene, values)?.at(scene)
 }
 
-/// Share of the tolerance that sums of waves keep.
+/// Share of the tolerance allowed for sums of waves.
 const SUMS: f64 = 0.05;
 
-/// How much steeper than in the frozen scene slopes may become.
+/// Factor by which slopes may exceed the steepest slope of the frozen scene.
 const STEEPER: f64 = 1.25;
 
 impl ExpectedImage {
@@ -150,7 +152,7 @@ impl ExpectedImage {
         })
     }
 
-    /// Values of the derivatives, in their order.
+    /// Values by which the image is differentiated, in order.
     #[must_use]
     pub fn values(&self) -> &[Value] {
         &self.values
@@ -158,7 +160,7 @@ impl ExpectedImage {
 
     /// The image of a scene and its derivatives.
     ///
-    /// - `scene` differs from the frozen one by [`Value`]s alone, and not by so much that its plan would be another
+    /// - `scene`: differs from the frozen scene by [`Value`]s only, and too little to change its plan
     ///
     /// # Errors
     ///
@@ -187,14 +189,14 @@ impl ExpectedImage {
     ///
     /// # Errors
     ///
-    /// As [`Self::at`].
+    /// As in [`Self::at`].
     pub fn intensity(&self, scene: &Scene) -> Result<Field> {
         Ok(self.draw::<0>(scene, &[], false)?.swap_remove(0))
     }
 
     /// The image and its derivatives.
     ///
-    /// - `squared`: the mean of the squares of the sources instead
+    /// - `squared`: compute the mean of the squared sources instead
     fn draw<const N: usize>(
         &self,
         scene: &Scene,
@@ -249,7 +251,7 @@ impl ExpectedImage {
     }
 }
 
-/// Whether a scene has what a smooth image needs.
+/// Checks that a scene meets the requirements of a smooth image.
 fn check(scene: &Scene, models: &Models, values: &[Value]) -> Result<()> {
     let conflict = |name: &str, value: String, requirement: &str| {
         Err(Error::Conflict {

@@ -1,4 +1,4 @@
-//! The surface of a scene with frozen plan: sums of waves, fields of effects, and σ⁰ by the slope.
+//! The surface of a scene with a frozen plan: sums of waves, fields of effects, and σ⁰ as a function of slope.
 
 use super::bright::BrightWaves;
 use super::cross_section::{CrossSection, Facets, OUTER};
@@ -119,7 +119,7 @@ impl<'a> Surface<'a> {
         }
     }
 
-    /// Whether all pixels are alike: neither waves nor effects.
+    /// Whether all pixels are alike, without waves or effects.
     pub(super) fn is_uniform(&self) -> bool {
         self.wakes.is_empty() && self.surroundings.each().iter().all(Option::is_none)
     }
@@ -128,7 +128,7 @@ impl<'a> Surface<'a> {
         self.surroundings.noise
     }
 
-    /// Largest values.
+    /// Largest values of the fields.
     pub(super) fn largest(&self, frozen: &Frozen) -> Largest {
         let raster = &frozen.raster;
         let of = |linear: Linear| {
@@ -153,7 +153,7 @@ impl<'a> Surface<'a> {
         }
     }
 
-    /// σ⁰ by the slope.
+    /// σ⁰ as a function of slope.
     pub(super) fn cross_section(&self, frozen: &Frozen) -> CrossSection {
         let of = |models: &Models| {
             let waves = match frozen.over_seas {
@@ -181,7 +181,7 @@ impl<'a> Surface<'a> {
 }
 
 impl Moved {
-    /// How the value changes the waves of the first ship.
+    /// Change of the first ship's waves with the value.
     fn change(&self) -> Change<'_> {
         let points = self.points.each_ref();
         Change {

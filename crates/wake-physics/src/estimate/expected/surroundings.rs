@@ -1,4 +1,4 @@
-//! What optional effects add to a mean image, as fields that each of them changes affinely.
+//! Contributions of optional effects to a mean image, as fields that each effect changes affinely.
 
 use crate::effects::{Effects, Site};
 use crate::estimate::value::Value;
@@ -9,17 +9,17 @@ use crate::raster::{Field, Raster};
 use crate::scene::{Scene, Term};
 use crate::workspace::Workspace;
 
-/// Fields of the effects of a scene; `None` where no effect has any.
+/// Fields of a scene's effects; `None` where no effect contributes.
 #[derive(Default)]
 pub(super) struct Surroundings {
     /// Share of the Bragg waves that remains \[1\].
     pub(super) remaining: Option<Field>,
     /// Velocity of the water along x [m/s].
     pub(super) velocity_x: Option<Field>,
-    /// Factor on σ⁰, and what is added to it: effects change σ⁰ affinely.
+    /// Factor on σ⁰, and term added to it: effects change σ⁰ affinely.
     pub(super) factor: Option<Field>,
     pub(super) added: Option<Field>,
-    /// Added to the intensity.
+    /// Noise added to the intensity.
     pub(super) noise: f64,
 }
 
@@ -81,7 +81,7 @@ impl Surroundings {
         out
     }
 
-    /// All fields, in one order.
+    /// All fields, in a fixed order.
     pub(super) fn each(&self) -> [Option<&Field>; FIELDS] {
         [
             self.remaining.as_ref(),
@@ -99,7 +99,7 @@ pub(super) struct Slopes {
 }
 
 impl Slopes {
-    /// - `points`: at −2, −1, 1 and 2 steps, or the middle two
+    /// - `points`: surroundings at −2, −1, 1 and 2 steps, or at the middle two only
     pub(super) fn new(value: Value, points: &[Option<Surroundings>; 4], step: f64) -> Self {
         let field = |n: usize| {
             let each = points

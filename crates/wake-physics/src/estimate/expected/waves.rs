@@ -1,12 +1,12 @@
-//! The linear fields of a ship's wake, and what their derivatives are summed from.
+//! The linear fields of a ship's wake, and the sums that give their derivatives.
 //!
 //! ```text
 //! F(x)  = Re Σ c e^{ik·(x − p)}                          p midship, c the strength of a wave of the frozen nodes
 //! dF(x) = Re Σ [dc + i c (dk·(x − p) − k·dp)] e^{ik·(x − p)},     dk = κ k + ρ (k_y, −k_x)
 //! ```
 //!
-//! κ: a change of speed stretches all waves, in deep water by one factor. ρ: a change of heading turns them. So the
-//! derivatives by speed, heading and position share the sums of i k c.
+//! A change of speed stretches all waves (κ), in deep water by one factor; a change of heading turns them (ρ). The derivatives by
+//! speed, heading and position therefore share the sums of i k c.
 
 use crate::estimate::value::Value;
 use crate::kelvin::{KelvinWake, WakePlan};
@@ -19,7 +19,7 @@ use crate::workspace::Workspace;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-/// Fields that the image is made of.
+/// Linear fields from which the image is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Linear {
     SlopeX,
@@ -34,7 +34,7 @@ pub(super) enum Linear {
 pub(super) const LINEAR: usize = 6;
 
 impl Linear {
-    /// Those that a plan needs, in their order.
+    /// Fields that a plan needs, in order.
     pub(super) fn needed(uses: impl Fn(Term) -> bool) -> Vec<Self> {
         let terms = [
             (Self::SlopeX, Term::Kelvin),
@@ -61,7 +61,7 @@ impl Linear {
     }
 }
 
-/// Waves of a wake and their strengths, one vector a field; phases counted from midship.
+/// Waves of a wake and their strengths, one vector per field, with phases relative to midship.
 struct Strengths {
     waves: PlaneWaves,
     of: Vec<Vec<Complex64>>,
@@ -71,7 +71,7 @@ struct Strengths {
 pub(super) type Seen<'a> = (&'a KelvinWake, &'a Transfer);
 
 impl Strengths {
-    /// - `modulating`: waves that modulate, by the wavenumbers of the frozen plan
+    /// - `modulating`: whether each wave modulates, by the wavenumbers of the frozen plan
     fn new(
         (wake, transfer): Seen<'_>,
         plan: &WakePlan,
@@ -103,7 +103,7 @@ impl Strengths {
     }
 }
 
-/// How a value changes the waves.
+/// Change of the waves with one value.
 pub(super) struct Change<'a> {
     /// The wake and its transfer at −2, −1, 1 and 2 steps; the first and last are missing for two-point differences.
     pub(super) seen: [Option<Seen<'a>>; 4],
@@ -111,7 +111,7 @@ pub(super) struct Change<'a> {
     pub(super) value: Value,
 }
 
-/// Derivative by differences of the fourth order where there are four points, of the second where there are two.
+/// Derivative by central differences: of fourth order with four points, of second order with two.
 pub(super) fn difference<T>(points: [Option<T>; 4], step: f64) -> T
 where
     T: Copy + std::ops::Sub<Output = T> + std::ops::Mul<f64, Output = T>,
@@ -130,19 +130,19 @@ pub(super) struct Sums {
     pub(super) field: Field,
     /// Re Σ i k c e^{…} along x and y.
     pub(super) gradient: [Field; 2],
-    /// The same with each wave times its κ, where κ is not one number.
+    /// The gradient with each wave multiplied by its κ, where κ differs between waves.
     pub(super) stretched: Option<[Field; 2]>,
     /// Re Σ dc e^{…} by value.
     pub(super) strength: Vec<(Value, Field)>,
 }
 
-/// All sums of a wake, and κ by speed where it is one number.
+/// All sums of a wake, and κ by speed where all waves share it.
 pub(super) struct WakeSums {
     pub(super) sums: Vec<Sums>,
     pub(super) stretch: f64,
 }
 
-/// What a set of strengths is summed for.
+/// Sum to which a set of strengths belongs.
 #[derive(Clone, Copy)]
 enum Part {
     Field,
@@ -151,19 +151,19 @@ enum Part {
     Strength(Value),
 }
 
-/// Waves that are frozen, and the fields that are summed of them.
+/// Frozen waves, and the fields that are summed from them.
 pub(super) struct Nodes<'a> {
     pub(super) plan: &'a WakePlan,
-    /// Waves that modulate.
+    /// Whether each wave modulates.
     pub(super) modulating: &'a [bool],
     pub(super) fields: &'a [Linear],
-    /// Of the sums.
+    /// Tolerance of the sums.
     pub(super) tolerance: f64,
 }
 
 /// Sums of a wake on a raster.
 ///
-/// - `changes`: values with derivatives; none of a wake that no value changes
+/// - `changes`: values with derivatives; empty for a wake that no value changes
 pub(super) fn sums(
     workspace: &mut Workspace,
     seen: Seen<'_>,
@@ -218,7 +218,7 @@ pub(super) fn sums(
             }
         }
     }
-    // Phases from the origin of the raster.
+    // Phases relative to the origin of the raster.
     let [x, y] = seen.0.track.position;
     let waves = &here.waves;
     let phases: Vec<Complex64> = (0..waves.len())
@@ -254,7 +254,7 @@ pub(super) fn sums(
     }
 }
 
-/// Where the field of a part belongs.
+/// Field that holds a part.
 fn place(sums: &mut Sums, part: Part) -> &mut Field {
     match part {
         Part::Field => &mut sums.field,
@@ -282,7 +282,7 @@ fn stretches(here: &PlaneWaves, points: &[Option<Strengths>; 4], step: f64) -> V
     (0..here.len()).map(of).collect()
 }
 
-/// Which waves of a frozen plan modulate.
+/// Whether each wave of a frozen plan modulates.
 pub(super) fn modulating(wake: &KelvinWake, plan: &WakePlan) -> Vec<bool> {
     let waves = wake.waves(plan);
     let modulates = |n: usize| waves.kx[n].hypot(waves.ky[n]) <= LARGEST_MODULATING_WAVENUMBER;

@@ -1,26 +1,25 @@
-//! The waves of a ship that turns: every point of its past track sends those that keep station with it there.
+//! Waves of a turning ship: every point of its past track sends the waves that keep station with it there.
 //!
-//! A source that moves along x(s), s the distance run since, sends all waves k. At the time of the picture they sum to
+//! A source that moves along x(s), s the distance run since, sends all waves k. At the time of the image they sum to
 //!
 //! ```text
 //! ζ(x) = Re ∫ d²k B(k)/(2πU) e^{ik·x} ∫ w(s) e^{−ik·x(s) − iωs/U} ds,      B = −(U/π) F̄ e^{−kd}
 //! ```
 //!
-//! On a straight track the inner integral is 2πU δ(U k·t − ω), the curve of steady waves, and B that of
-//! [`KelvinWake::amplitude`]. On a circle of radius R around C, with α = s/R and β the direction of k from the heading,
-//! both counted against the turn, it is
+//! On a straight track the inner integral is 2πU δ(U k·t − ω), the curve of steady waves, and B gives the amplitude of
+//! [`KelvinWake::amplitude`]. On a circle of radius R around C, with α = s/R and β the direction of k from the heading, both
+//! counted against the turn, it is
 //!
 //! ```text
 //! ∫ w e^{−ik·x(s) − iωs/U} ds = R e^{−ik·C} Σₘ Jₘ(kR) ŵ(m − ωR/U) e^{imβ},     ŵ(q) = ∫ w(α) e^{iqα} dα
 //! ```
 //!
-//! by e^{iz sin φ} = Σ Jₘ(z) e^{imφ} (Jacobi and Anger): one FFT for each k. Nothing is approximated but that the strength
-//! and phase F̄ of the source are those of the steady wave of length 2π/k. So caustics where a turn focuses its waves are
-//! right, too.
+//! by e^{iz sin φ} = Σ Jₘ(z) e^{imφ} (Jacobi and Anger): one FFT for each k. The only approximation is that strength and phase F̄
+//! of the source are those of the steady wave of length 2π/k. Caustics, where a turn focuses its waves, are therefore right, too.
 //!
-//! w rises from bow to stern as the waves of a straight track are faded there. Waves longer than any steady wave are
-//! summed with all others: they are the local rise of water around the hull, and without them the sum over k would end
-//! sharply where they begin.
+//! w rises from bow to stern like the fade of the waves of a straight track. Waves longer than any steady wave are summed with
+//! all others: they are the local rise of water around the hull, and without them the sum over k would end sharply where they
+//! begin.
 
 mod sent;
 
@@ -34,36 +33,36 @@ use rayon::prelude::*;
 use sent::Sent;
 use std::f64::consts::{PI, TAU};
 
-/// Wavenumbers, over that of the longest steady wave, between which the onset becomes sharp: chosen.
+/// Wavenumbers, over that of the longest steady wave, between which the onset becomes sharp (chosen).
 const LONG: [f64; 2] = [0.6, 1.0];
 
-/// Rings that are counted one by one.
+/// Largest number of rings that are counted one by one.
 const MOST_COUNTED: usize = 1 << 14;
 
-/// Rings from which the number of waves that are kept is foreseen, and waves that are looked at for it at most: chosen.
+/// Number of rings from which the number of kept waves is estimated, and largest number of waves computed for it (chosen).
 const LOOKED_AT: usize = 16;
 const MOST_LOOKED_AT: f64 = 2e6;
 
-/// Waves of ships that turn, as counted before they are computed.
+/// Work for the waves of turning ships, counted before they are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct RingWork {
-    /// Waves, of all ships and of the ship that has most.
+    /// Waves of all ships, and of the ship that has most.
     pub(crate) nodes: f64,
     pub(crate) most_nodes: f64,
-    /// Waves that are strong enough to be summed, likewise.
+    /// Waves that are strong enough to be summed, of all ships and of the ship that has most.
     pub(crate) kept: f64,
     pub(crate) most_kept: f64,
-    /// Bessel functions, and sums of them.
+    /// Bessel functions, and terms of their sums.
     pub(crate) terms: f64,
 }
 
-/// Terms of the sum over m that are left out, over the share of weak waves and the largest term (chosen).
+/// Size of the terms of the sum over m that are left out, over the share of weak waves and the largest term (chosen).
 const WEAK: f64 = 1e-3;
 
-/// Rings whose transforms are planned at once: a plan takes as much memory as the waves of its ring.
+/// Number of rings whose transforms are planned at once: a plan takes as much memory as the waves of its ring.
 const PLANNED_AT_ONCE: usize = 64;
 
-/// Which waves of a turning ship are summed: rings of wavenumbers, each as many directions as the raster asks for.
+/// Waves of a turning ship that are summed: rings of wavenumbers, each with as many directions as the raster requires.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Rings {
     /// Radius of the turn R \[m\].
@@ -72,12 +71,12 @@ pub(super) struct Rings {
     side: f64,
     /// The waves that reach the raster.
     sent: Sent,
-    /// Waves weaker than this share of the root mean square are left out, by energy.
+    /// Share of the root mean square below which waves are left out, by energy.
     least: f64,
 }
 
 impl Rings {
-    /// The rings for a raster; `None` if no wave that it carries reaches it.
+    /// Rings for a raster; `None` if no wave that it carries reaches it.
     pub(super) fn of(wake: &KelvinWake, raster: &Raster, tolerance: f64) -> Option<Self> {
         let (radius, side) = wake.track.turn()?;
         if wake.speed <= 0.0 {
@@ -97,7 +96,7 @@ impl Rings {
         [self.sent.wavenumber(0), self.sent.largest()]
     }
 
-    /// Directions of a ring.
+    /// Number of directions of a ring.
     fn directions(&self, ring: usize) -> usize {
         let k = self.sent.wavenumber(ring);
         let phase = k * self.sent.reach(k);
@@ -105,8 +104,8 @@ impl Rings {
         fast_length((phase + 10.0 * phase.cbrt() + 32.0).ceil() as usize)
     }
 
-    /// Rings of which one is counted, and how many it stands for: rings change little from one to the next, so of very many
-    /// only some are looked at.
+    /// Rings that are counted, each with the number of rings it stands for: rings change little from one to the next, so of very
+    /// many only some are counted.
     fn counted(&self) -> impl Iterator<Item = [usize; 2]> {
         let rings = self.sent.rings();
         let every = rings.div_ceil(MOST_COUNTED).max(1);
@@ -116,7 +115,7 @@ impl Rings {
         })
     }
 
-    /// Waves of all rings up to a wavenumber, and beyond it, before the weak ones are left out.
+    /// Number of waves of all rings below a wavenumber, and from it on, before weak waves are left out.
     pub(super) fn nodes(&self, cusp: f64) -> [usize; 2] {
         let mut nodes = [0; 2];
         for [ring, some] in self.counted() {
@@ -125,7 +124,7 @@ impl Rings {
         nodes
     }
 
-    /// What the rings take to compute.
+    /// Work to compute the rings.
     pub(super) fn work(&self, wake: &KelvinWake) -> RingWork {
         let nodes = self.nodes(f64::INFINITY)[0] as f64;
         let kept = (self.kept_share(wake, nodes) * nodes).ceil();
@@ -141,7 +140,7 @@ impl Rings {
         }
     }
 
-    /// Share of the waves that are not weak, from a few rings; all of them where even a few are too many to look at.
+    /// Share of the waves that are not weak, estimated from a few rings; 1 where even a few rings have too many waves to compute.
     fn kept_share(&self, wake: &KelvinWake, nodes: f64) -> f64 {
         let count = self.sent.rings();
         let every = count.div_ceil(LOOKED_AT).max(1);
@@ -158,21 +157,21 @@ impl Rings {
         energies().filter(|&energy| energy > least).count() as f64 / count as f64
     }
 
-    /// Energy of a wave of a ring, but for a factor: its share of all water, which is the larger the less of the plane of
-    /// wavenumbers it stands for.
+    /// Energy of a wave of a ring, up to a factor: its share of all water, which is larger the less of the plane of wavenumbers
+    /// it stands for.
     fn energy(&self, ring: usize) -> impl Fn(&Complex64) -> f64 + use<> {
         let reach = self.sent.reach(self.sent.wavenumber(ring));
         move |amplitude| amplitude.norm_sqr() * reach * reach
     }
 
-    /// Number of waves, and energy below which one is weak.
+    /// Number of waves, and energy below which a wave is weak.
     fn least_energy(&self, energies: impl Iterator<Item = f64>) -> (usize, f64) {
         let (count, sum) =
             energies.fold((0, 0.0), |(count, sum), energy| (count + 1, sum + energy));
         (count, self.least.powi(2) * sum / count.max(1) as f64)
     }
 
-    /// The waves.
+    /// Plane waves of all rings without the weak ones.
     pub(super) fn waves(&self, wake: &KelvinWake) -> PlaneWaves {
         let count = self.sent.rings();
         let rings: Vec<Vec<Complex64>> = (0..count)
@@ -197,7 +196,7 @@ impl Rings {
             for (n, amplitude) in amplitudes.iter().enumerate() {
                 if energy(amplitude) > least {
                     let (sin, cos) = (turn * n as f64).sin_cos();
-                    // Against the clock from the heading is to port.
+                    // Counter-clockwise from the heading is to port.
                     let k = wake.track.turned([k * cos, -self.side * k * sin]);
                     let phase = Complex64::cis(-(k[0] * centre[0] + k[1] * centre[1]));
                     out.push(k, omega, amplitude * phase);
@@ -207,7 +206,7 @@ impl Rings {
         out
     }
 
-    /// The amplitudes of some rings.
+    /// Amplitudes of several rings.
     fn amplitudes_of(&self, wake: &KelvinWake, rings: &[usize]) -> Vec<Vec<Complex64>> {
         let mut planner = Circle::planner();
         let plan = |&ring: &usize| Circle::planned(&mut planner, self.directions(ring));
@@ -222,7 +221,7 @@ impl Rings {
         [0, 1].map(|a| wake.track.position[a] - self.side * self.radius * port[a])
     }
 
-    /// k dk dβ B R/(2πU) Σₘ Jₘ(kR) ŵ(m − ωR/U) e^{imβ} of the directions β of a ring.
+    /// k dk dβ B R/(2πU) Σₘ Jₘ(kR) ŵ(m − ωR/U) e^{imβ} for the directions β of a ring.
     fn amplitudes(&self, wake: &KelvinWake, ring: usize, circle: &Circle) -> Vec<Complex64> {
         let k = self.sent.wavenumber(ring);
         let omega = angular_frequency(k, wake.depth);
@@ -256,8 +255,8 @@ impl Rings {
 
     /// Middle and width of the onset of the oldest waves k \[m\].
     ///
-    /// Waves longer than any steady one are not sent on the way, but a sharp onset would send them ahead of all others: theirs
-    /// is as wide as the time since allows.
+    /// Waves longer than any steady wave are not sent on the way, but a sharp onset would send them ahead of all others; their
+    /// onset is as wide as the time since allows.
     fn fall(&self, k: f64) -> [f64; 2] {
         let [from, to] = self.sent.onset(k);
         let middle = 0.5 * (from + to);
@@ -266,8 +265,8 @@ impl Rings {
     }
 }
 
-/// w rises along the hull, as a straight wake fades there, and falls over the onset of a wave: angles of the middle of the fall, and half the widths
-/// of fall and rise.
+/// Onsets of w, which rises along the hull like the fade of a straight wake and falls over the onset of a wave: angles of the
+/// middle of the fall, and of half the widths of fall and rise.
 #[derive(Clone, Copy)]
 struct Onsets {
     angles: [f64; 3],
@@ -282,7 +281,8 @@ impl Onsets {
         }
     }
 
-    /// |q| beyond which ŵ is below a share of its largest value: each of its two steps is at most 15 (1 + 3/z + 3/z²)/z³, z = q times half the width.
+    /// |q| beyond which ŵ is below a share of its largest value: each of its two steps is at most 15 (1 + 3/z + 3/z²)/z³, with z
+    /// = q times half the width.
     fn width(&self, share: f64) -> f64 {
         let [middle, fall, rise] = self.angles;
         let bound = |q: f64| {
@@ -296,7 +296,7 @@ impl Onsets {
         q
     }
 
-    /// ŵ(q), ŵ(q + by), …, whose phases follow by rotation.
+    /// Sequence ŵ(q), ŵ(q + by), …, whose phases follow by rotation.
     fn from(self, q: f64, by: f64) -> Spectrum {
         Spectrum {
             of: self,
@@ -308,7 +308,7 @@ impl Onsets {
     }
 }
 
-/// ŵ at equal distances.
+/// ŵ at equal steps of q.
 struct Spectrum {
     of: Onsets,
     q: f64,
@@ -355,9 +355,9 @@ fn step_spectrum(z: f64, phase: Complex64) -> f64 {
     15.0 * ((3.0 / square - 1.0) * phase.im / z - 3.0 * phase.re / square) / square
 }
 
-/// J₀(z), J₁(z) … until they are below rounding, z at least 0.
+/// J₀(z), J₁(z) … up to the order where they fall below rounding, z at least 0.
 ///
-/// Miller's method: the recurrence downward from an order where they vanish, scaled so that J₀ + 2J₂ + 2J₄ + … = 1.
+/// Miller's method: downward recurrence from an order where they vanish, scaled so that J₀ + 2J₂ + 2J₄ + … = 1.
 fn bessel_functions(z: f64) -> Vec<f64> {
     if z <= 0.0 {
         return vec![1.0];

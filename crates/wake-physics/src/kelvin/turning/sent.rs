@@ -1,4 +1,4 @@
-//! Which steady waves of a turning ship reach a raster, from how far they come, and which of them are summed.
+//! Steady waves of a turning ship that reach a raster: how far they come, and which of them are summed.
 
 use super::super::KelvinWake;
 use crate::constants::GRAVITY;
@@ -6,39 +6,39 @@ use crate::dispersion::{angular_frequency, group_speed};
 use crate::raster::Raster;
 use std::f64::consts::{PI, TAU};
 
-/// Steps along the track in which the waves that reach a raster are looked for, over half its diagonal, and over the distance
-/// run where that is longer: chosen.
+/// Steps along the track in the search for waves that reach a raster, over half its diagonal, and over the distance run where
+/// that is longer (chosen).
 const STEPS: [f64; 2] = [1.0 / 32.0, 1.0 / 64.0];
 
-/// Wavenumbers at which they are looked for.
+/// Number of wavenumbers at which they are searched.
 const KNOTS: usize = 12;
 
-/// Wavelengths over which the oldest waves set in, on deep water and where all waves are as fast: there waves of the onset
-/// stay near those of the wake. Chosen.
+/// Wavelengths over which the oldest waves set in (chosen): in deep water, and where all waves are equally fast, so that waves of
+/// the onset stay near the waves of the wake.
 const ONSET: [f64; 2] = [3.0, 10.0];
 
-/// Largest wavelength with a reach and an onset of its own, over that of the longest steady wave on deep water. A ship faster
-/// than the waves of a shallow sea has steady waves of any length. Chosen.
+/// Largest wavelength with a reach and an onset of its own, over that of the longest steady wave in deep water (chosen). A ship
+/// faster than the waves of a shallow sea has steady waves of any length.
 const LONGEST: f64 = 20.0;
 
-/// Samples beyond those that the largest phase asks for: the tails of what is summed.
+/// Factor on the number of samples that the largest phase requires, for the tails of the sum.
 const GUARD: f64 = 1.15;
 
-/// The waves that reach a raster, by wavenumber.
+/// Waves that reach a raster, by wavenumber.
 ///
-/// Waves that come from a distance ℓ have phases that change by ℓ dk: they are summed in steps of 2π/ℓ(k), which are shorter
-/// for the long waves that come from far away than for short ones.
+/// Waves that come from a distance ℓ have phases that change by ℓ dk. They are summed in steps of 2π/ℓ(k), which are shorter for
+/// the long waves that come from far away than for short ones.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Sent {
     /// Wavenumber of the longest steady wave [rad/m].
     pub(super) longest: f64,
-    /// Wavenumbers at which the rest is known, growing to the largest of the raster [rad/m].
+    /// Wavenumbers at which the other values are tabulated, increasing to the largest of the raster [rad/m].
     knots: [f64; KNOTS],
     /// Distances run between which the oldest waves set in \[m\].
     onsets: [[f64; 2]; KNOTS],
     /// Largest phase over k \[m\].
     reaches: [f64; KNOTS],
-    /// Rings of waves below each knot.
+    /// Number of rings below each knot.
     below: [f64; KNOTS],
 }
 
@@ -68,7 +68,7 @@ impl Sent {
         let next = |&[s, _]: &[f64; 2]| (s < run).then(|| [(s + step(s)).min(run), step(s)]);
         let passed: Vec<[f64; 2]> = std::iter::successors(Some([0.0, step(0.0)]), next).collect();
         let ways = knots.map(|k| steady_way(wake, k));
-        // Distances, to port and to starboard, at which the waves are now that were sent a distance s ago.
+        // Present distances from the middle of the raster, to port and to starboard, of the waves sent a distance s ago.
         let away = |s: f64, [ahead, aside]: [f64; 2]| {
             let there = wake.track.at(-s);
             let port = there.port();
@@ -90,7 +90,7 @@ impl Sent {
         if oldest.iter().all(Option::is_none) {
             return None;
         }
-        // Between two knots the later, or farther, of them holds.
+        // Between two knots, the later or farther of them holds.
         let largest_around = |values: [f64; KNOTS]| -> [f64; KNOTS] {
             std::array::from_fn(|knot| {
                 let around = &values[knot.saturating_sub(1)..(knot + 2).min(KNOTS)];
@@ -100,7 +100,7 @@ impl Sent {
         let oldest = largest_around(oldest.map(Option::unwrap_or_default));
         let onsets: [[f64; 2]; KNOTS] = std::array::from_fn(|knot| {
             let (oldest, length) = (oldest[knot], TAU / knots[knot]);
-            // A wave is sent over a stretch of the track: the cube root of λs² at the cusp, where it is longest.
+            // A wave is sent over a stretch of the track, longest at the cusp, where it is the cube root of λs².
             let oldest = (oldest + (oldest * oldest * length).cbrt()).min(run);
             let ramp = (onset_lengths(wake, knots[knot]) * length)
                 .max(0.1 * oldest)
@@ -160,7 +160,7 @@ impl Sent {
         if knot == 0 {
             return rings * TAU / self.reaches[0];
         }
-        // The reach changes evenly from knot to knot, so the rings between them are those of a parabola.
+        // The reach changes linearly from knot to knot, so the rings between them follow a parabola.
         let before = knot.min(KNOTS - 1) - 1;
         let [reach, next] = [self.reaches[before], self.reaches[before + 1]];
         let slope = (next - reach) / (self.knots[before + 1] - self.knots[before]);
@@ -169,20 +169,20 @@ impl Sent {
         self.knots[before] + 2.0 * phase / (reach + root)
     }
 
-    /// Largest phase of the waves k, over k \[m\].
+    /// Largest phase of the waves k, divided by k \[m\].
     pub(super) fn reach(&self, k: f64) -> f64 {
         let (knot, part) = self.place(k);
         self.reaches[knot] + part * (self.reaches[knot + 1] - self.reaches[knot])
     }
 
-    /// Distances run between which the oldest waves k set in \[m\]; those of the longest steady wave for longer ones.
+    /// Distances run between which the oldest waves k set in \[m\]; longer waves take those of the first knot.
     pub(super) fn onset(&self, k: f64) -> [f64; 2] {
         let (knot, part) = self.place(k);
         let [before, after] = [self.onsets[knot], self.onsets[knot + 1]];
         [0, 1].map(|n| before[n] + part * (after[n] - before[n]))
     }
 
-    /// The knot before a wavenumber, and the part of the way to the next.
+    /// Index of the knot before a wavenumber, and fraction of the way to the next.
     fn place(&self, k: f64) -> (usize, f64) {
         let after = self.knots.partition_point(|&knot| knot <= k);
         let knot = after.clamp(1, KNOTS - 1) - 1;
@@ -191,15 +191,15 @@ impl Sent {
     }
 }
 
-/// Way of a steady wave while its ship runs one metre, ahead and aside: the group speed over the ship's, in the direction
-/// that keeps station, cos θ = ω/(kU).
+/// Distance that a steady wave travels, ahead and aside, while its ship runs one metre: the group speed over the ship's, in the
+/// direction that keeps station, cos θ = ω/(kU).
 fn steady_way(wake: &KelvinWake, k: f64) -> [f64; 2] {
     let cos = (angular_frequency(k, wake.depth) / (k * wake.speed)).min(1.0);
     let group = group_speed(k, wake.depth) / wake.speed;
     [group * cos, group * (1.0 - cos * cos).sqrt()]
 }
 
-/// Wavelengths over which the oldest waves k set in, by group over phase speed: ½ on deep water, 1 on shallow.
+/// Wavelengths over which the oldest waves k set in, by group over phase speed: ½ in deep water, 1 in shallow.
 fn onset_lengths(wake: &KelvinWake, k: f64) -> f64 {
     let share = group_speed(k, wake.depth) * k / angular_frequency(k, wake.depth);
     ONSET[0] + (ONSET[1] - ONSET[0]) * (2.0 * share - 1.0)
@@ -217,7 +217,7 @@ mod tests {
         }
     }
 
-    /// Turns so wide that they are straight have the waves of each other, found in a few steps.
+    /// On turns so wide that they are straight, the same waves are sent, and they are found in a few steps.
     #[test]
     fn of_wide_turns_the_waves_of_a_straight_track_are_sent() {
         let raster = Raster::image(91, 91, 2.0);
@@ -228,21 +228,21 @@ mod tests {
         }
     }
 
-    /// A wide turn is straight as far as the raster sees. On deep water with c² = cos² θ = k₀/k the wave k that a ship in its
-    /// middle sent a distance s ago lies √((1 − c²/2)² + c²(1 − c²)/4) s away: at the distance h of a corner it is the last
-    /// that reaches the raster, and three wavelengths later none are sent.
+    /// A wide turn is straight within the raster. In deep water, with c² = cos² θ = k₀/k, the wave k that a ship in the middle
+    /// sent a distance s ago lies √((1 − c²/2)² + c²(1 − c²)/4) s away: at the distance h of a corner it is the last that reaches
+    /// the raster, and three wavelengths later none are sent.
     #[test]
     fn only_waves_that_reach_the_raster_are_sent() {
         let radius = 2000.0f64;
         let raster = Raster::image(91, 91, 2.0);
         let sent = Sent::of(&boat([0.0, 0.0], radius), &raster, radius).unwrap();
         let half = 90.0 * f64::sqrt(2.0);
-        // A step of the search is looked beyond, and one is its resolution; the turn bends 290 m by 21 m, 1 m more.
+        // The search looks one step beyond, and one step is its resolution; the turn bends 290 m by 21 m, 1 m more.
         let step = STEPS[0] * half;
         assert!((sent.longest - GRAVITY / 25.0).abs() < 1e-9 * sent.longest);
         for knot in [0, 3, KNOTS - 1] {
             let k = sent.knots[knot];
-            // Shorter waves stay behind less: of the knots around, the one before is the latest.
+            // Shorter waves fall behind less, so of the neighbouring knots the one before is the latest.
             let square = sent.longest / sent.knots[knot.saturating_sub(1)];
             let away = (1.0 - 0.5 * square).hypot(0.5 * (square * (1.0 - square)).sqrt());
             let [from, to] = sent.onset(k);
@@ -254,17 +254,17 @@ mod tests {
                 "{knot}: {from}"
             );
             let ramp = (ONSET[0] * TAU / k).max(0.1 * from);
-            // Surface tension makes the group faster by (k/370 m⁻¹)², at most 2e-5 of it: five times that in the onset.
+            // Surface tension makes the group faster by (k/370 m⁻¹)², at most by 2e-5; five times that in the onset.
             assert!(
                 (to - from - ramp).abs() < 1e-4 * ramp,
                 "{knot}: {from} {to} {ramp}"
             );
-            // None are farther away than their sources.
+            // No wave is farther away than its source.
             assert!(sent.reach(k) < GUARD * (to + half) + TAU / sent.longest + 1.0);
         }
     }
 
-    /// Rings are a reach apart in phase, 2π dk⁻¹, and fill the wavenumbers of the raster.
+    /// Rings are spaced by 2π over their reach, and fill the wavenumbers of the raster.
     #[test]
     fn rings_are_as_far_apart_as_their_reach_asks_for() {
         let raster = Raster::image(91, 91, 2.0);
@@ -280,7 +280,7 @@ mod tests {
             for ring in 0..sent.rings() {
                 let k = sent.wavenumber(ring);
                 let step = TAU / sent.reach(k);
-                // The middle of a step begins where the last one ended, to the second order of the change.
+                // The middle of a step begins where the last one ended, to second order in the change.
                 assert!((k - end - 0.5 * step).abs() < 0.02 * step, "{ring}: {k}");
                 end = k + 0.5 * step;
             }
@@ -294,7 +294,7 @@ mod tests {
         let raster = Raster::image(91, 91, 2.0);
         assert!(Sent::of(&wake([0.0, 0.0]), &raster, 100.0).is_some());
         assert!(Sent::of(&wake([2000.0, 0.0]), &raster, 100.0).is_none());
-        // Waves of a raster too coarse for the longest of them.
+        // A raster too coarse for the longest waves.
         let coarse = Raster::image(9, 9, 20.0);
         assert!(Sent::of(&wake([0.0, 0.0]), &coarse, 100.0).is_none());
     }

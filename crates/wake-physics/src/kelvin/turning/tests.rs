@@ -5,7 +5,7 @@ use crate::hull::Hull;
 use crate::track::Track;
 use crate::waves::{Quantity, Transfer, harmonic_sum};
 
-/// A boat of 5 m/s, transverse waves of 16 m; the filter leaves 0.2 % at the end of the band of 2 m pixels.
+/// A boat of 5 m/s with transverse waves of 16 m; the filter leaves 0.2 % at the end of the band of 2 m pixels.
 pub(super) fn boat(heading: f64, radius: f64) -> KelvinWake {
     KelvinWake {
         hull: Hull::wigley(20.0, 4.0, 1.5),
@@ -45,19 +45,19 @@ fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// Largest difference over the root of the mean square.
+/// Largest difference over the root mean square.
 fn largest(a: &[f64], b: &[f64]) -> f64 {
     let pairs = a.iter().zip(b);
     pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / rms(b)
 }
 
-/// Against the sum over a moving point: at every step of the track it sends rings J₀(kr) of all wavelengths,
+/// The rings agree with the sum over a moving point that sends rings J₀(kr) of all wavelengths at every step of the track,
 ///
 /// ```text
 /// ζ = Re (1/U) ∫ w(s) ∫ B(k) J₀(k|x − x(s)|) e^{−iωs/U} k dk ds
 /// ```
 ///
-/// by the midpoint rule in s and in k, both finer than the waves. Nothing but B, w and x(s) is shared.
+/// by the midpoint rule in s and in k, both finer than the waves. Only B, w and x(s) are shared.
 #[test]
 fn the_rings_of_a_moving_source_add_to_the_wake() {
     for radius in [250.0, -400.0] {
@@ -71,7 +71,7 @@ fn the_rings_of_a_moving_source_add_to_the_wake() {
         let of_ring = |n: usize| {
             let k = band * (n as f64 + 0.5) / rings as f64;
             let omega = angular_frequency(k, wake.depth);
-            // The source of the steady wave of this length; shorter waves than the longest have none of their own.
+            // The source of the steady wave of this length; waves longer than the longest steady wave have none of their own.
             let u = steady.last(k).unwrap_or(0.0);
             let wave = steady.at(u);
             let along = if k > wave.wavenumber {
@@ -111,19 +111,19 @@ fn the_rings_of_a_moving_source_add_to_the_wake() {
             .collect();
         assert!(rms(&direct) > 1e-3);
         let far = largest(&fast, &direct);
-        // The sharp end of the band, where e^{−kd} is 1 % of its value at the longest waves, is summed by other rules.
+        // The two sums treat the sharp end of the band differently; there e^{−kd} is 1 % of its value at the longest waves.
         assert!(far < 1e-2, "{radius}: {far:e}");
     }
 }
 
-/// A wide turn is a straight track: the difference falls with the radius, to the first order.
+/// A wide turn is nearly a straight track: the difference falls with the radius, to first order.
 #[test]
 fn on_a_wide_turn_the_wake_is_that_of_a_straight_track() {
     let straight = KelvinWake {
         track: Track::new([20.0, 40.0], 20.0, 0.0),
         ..boat(20.0, 1.0)
     };
-    // Clear of the hull, where both fade in their own way, and within the wedge.
+    // Clear of the hull, where the two fade differently, and within the wedge.
     let astern: Vec<[usize; 2]> = pixels()
         .into_iter()
         .filter(|&[i, j]| {
@@ -135,9 +135,9 @@ fn on_a_wide_turn_the_wake_is_that_of_a_straight_track() {
     let expected = elevation(&straight, &astern);
     let radii = [1e4, 1e5];
     let far = radii.map(|radius| largest(&elevation(&boat(20.0, radius), &astern), &expected));
-    // The waves of the cusp come from 1.5 times the distance astern, so from 350 m: they are 0.056·350²/R off to the side,
-    // with 0.34 of a radian a metre. The sharp end of the band, where k e^{−kd} is 3.6 % of its value at the longest waves,
-    // is summed by other rules. Peaks are three times the root of the mean square.
+    // The waves of the cusp come from 1.5 times the distance astern, so from 350 m: they are 0.056·350²/R off to the side, with
+    // 0.34 rad per metre. The two sums treat the sharp end of the band differently; there k e^{−kd} is 3.6 % of its value at the
+    // longest waves. Peaks are three times the root mean square.
     for (radius, far) in radii.into_iter().zip(far) {
         let off = 0.34 * 0.056 * 350.0f64.powi(2) / radius;
         assert!(far < 3.0 * (off + 0.036), "{radius}: {far:e}");
@@ -145,7 +145,7 @@ fn on_a_wide_turn_the_wake_is_that_of_a_straight_track() {
     assert!(far[0] > 3.0 * far[1], "{far:?}");
 }
 
-/// On shallow water too, by a ship faster than its longest waves, which are sent behind it at the angle of Mach.
+/// The same in shallow water, for a ship faster than its longest waves, which travel behind it at the Mach angle.
 #[test]
 fn on_shallow_water_the_wake_of_a_wide_turn_is_that_of_a_straight_track() {
     let shallow = |track| KelvinWake {
@@ -178,8 +178,8 @@ fn on_shallow_water_the_wake_of_a_wide_turn_is_that_of_a_straight_track() {
             straight.track.seen_from_ship([raster.x(j), raster.y(i)])[0] < -60.0
         })
         .collect();
-    // The sharp end of the band is summed by other rules, as on deep water; waves come from 500 m ago, where the narrower turn
-    // is 1 m off to the side, and change by 0.15 of a radian a metre.
+    // The sharp end of the band is summed differently, as in deep water; waves come from 500 m back, where the narrower turn is 1
+    // m off to the side, and change by 0.15 rad per metre.
     for radius in [1e5, 1e6] {
         let turning = shallow(Track::turning([20.0, 40.0], 20.0, 0.0, f64::recip(radius)));
         let (count, found) = elevation(&turning, 1e-3);
@@ -193,7 +193,7 @@ fn on_shallow_water_the_wake_of_a_wide_turn_is_that_of_a_straight_track() {
     }
 }
 
-/// To port as to starboard, mirrored; and whatever the heading.
+/// Wakes on turns to port and starboard mirror each other, and wakes turn with the heading.
 #[test]
 fn mirrored_and_turned_ships_have_mirrored_and_turned_wakes() {
     let at = |heading: f64, place: [f64; 2], radius: f64| KelvinWake {
@@ -240,8 +240,8 @@ fn the_window_is_the_transform_of_its_steps() {
     }
 }
 
-/// The plan counts all waves of the rings, those beyond the cusp apart; waves weaker than their share of the root mean square
-/// are left out, and no others.
+/// The plan counts all waves of the rings, with those beyond the cusp apart; exactly the waves weaker than their share of the
+/// root mean square are left out.
 #[test]
 fn weak_waves_are_left_out_and_counted_before() {
     let wake = boat(20.0, 300.0);
@@ -267,7 +267,7 @@ fn weak_waves_are_left_out_and_counted_before() {
             .filter(|&&s| s > least * least * mean)
             .count();
         let kept = Rings { least, ..all }.waves(&wake).len();
-        // Rounded wavenumbers may put a wave on the other side.
+        // Rounded wavenumbers may put a wave on the other side of the limit.
         assert!(
             kept.abs_diff(strong) <= 2 && kept < waves.len(),
             "{least}: {kept} {strong}"
@@ -275,8 +275,8 @@ fn weak_waves_are_left_out_and_counted_before() {
     }
 }
 
-/// The waves that are kept are foreseen from a few rings to a fifth, all waves of few rings exactly; of rings too many to look
-/// at, all count.
+/// The number of kept waves is estimated to a fifth from a few rings, and the number of all waves to 1e-3 from some of many
+/// rings; where rings have too many waves to compute, all count.
 #[test]
 fn waves_that_are_kept_are_foreseen() {
     let wake = boat(20.0, 300.0);
@@ -313,7 +313,7 @@ fn waves_that_are_kept_are_foreseen() {
     assert_eq!(work.kept, work.nodes);
 }
 
-/// Rotated phases are those of sines and cosines, up to some roundings a step.
+/// Rotated phases equal sines and cosines, up to some roundings a step.
 #[test]
 fn spectra_at_equal_distances_are_those_of_each() {
     let wake = boat(20.0, 300.0);
@@ -328,7 +328,7 @@ fn spectra_at_equal_distances_are_those_of_each() {
     }
 }
 
-/// What is left out of the sum over m is weak.
+/// Terms that are left out of the sum over m are weak.
 #[test]
 fn the_window_is_weak_beyond_its_width() {
     let wake = boat(20.0, 300.0);
@@ -341,7 +341,7 @@ fn the_window_is_weak_beyond_its_width() {
             let beyond = (0..4000).map(|n| at(width * (1.0 + 1e-3 * f64::from(n))));
             let largest = beyond.fold(0.0, f64::max);
             assert!(largest <= share * at(0.0), "{k} {share}: {largest:e}");
-            // Not much less far it is not.
+            // The width is not much too large.
             let inside = (0..4000).map(|n| at(0.4 * width * (1.0 + 1e-4 * f64::from(n))));
             assert!(inside.fold(0.0, f64::max) > share * at(0.0), "{k} {share}");
         }

@@ -1,17 +1,17 @@
-//! Velocity bunching: every source pixel goes where its motion puts it, as wide as its motion makes it.
+//! Velocity bunching: every source pixel is displaced by its velocity and widened by its acceleration.
 //!
 //! ```text
 //! I(y, x) = Σ σ⁰ P(y − y' − (R/V) u_r; ρ') Λ(x − x' + ζ cot θ),     P(y; ρ) ∝ exp(−(π/ρ)² y²)
 //! ```
 //!
-//! P is sampled at the pixels and normalised to the sum 1; Λ is the linear (cloud-in-cell) weight of range, whose
-//! resolution is the pixel. So all power arrives, none twice. What is displaced out of the image is lost, what the
-//! margin displaces into it is there; nothing wraps.
+//! P is sampled at the pixels and normalised to sum 1; Λ is the linear (cloud-in-cell) weight in range, whose resolution is
+//! the pixel, so that power is conserved. Sources displaced out of the image are lost, sources of the margin may be
+//! displaced into it; nothing wraps around.
 //!
 //! # Validity
 //!
-//! A source pixel is a point: where ρ' is smaller than the distance between the images of neighbours, the image
-//! is grainy. Coherence or many looks fill the gaps; without them a finer grid does.
+//! A source pixel is a point: where ρ' is smaller than the distance between the images of neighbours, the image is grainy.
+//! Coherence or many looks fill the gaps, otherwise a finer grid does.
 //!
 //! # References
 //!
@@ -27,22 +27,22 @@ use std::f64::consts::LOG2_E;
 use std::ops::Range;
 
 impl Imaging {
-    /// The image before speckle, in the unit of σ⁰, on the raster `image`.
+    /// Image before speckle, in units of σ⁰, on the raster `image`.
     ///
-    /// - `tolerance`: largest sum of |error| in the response of any one source, relative to its power; so the mean
-    ///   |error| of the image is within `tolerance` of its mean. The rounding of `f32` adds about 1e-6.
+    /// - `tolerance`: largest sum of |error| in the response of any one source, relative to its power; thus the mean
+    ///   |error| of the image is within `tolerance` of its mean. Rounding to `f32` adds about 1e-6.
     ///
     /// The result does not depend on the number of threads.
     ///
     /// # Panics
     ///
-    /// If a field is not of the size of its raster or the rasters' spacings differ.
+    /// If a field does not match its raster in size, or the rasters' spacings differ.
     #[must_use]
     pub fn image(&self, sources: &Sources<'_>, image: &Raster, tolerance: f64) -> Field {
         self.image_in(&mut Workspace::default(), sources, image, tolerance)
     }
 
-    /// [`Self::image`] in blocks of a workspace.
+    /// [`Self::image`] with buffers from a workspace.
     pub(crate) fn image_in(
         &self,
         workspace: &mut Workspace,
@@ -53,7 +53,7 @@ impl Imaging {
         sources.check();
         let sum = Sum::new(self, sources, image, tolerance);
         let width = sum.block_width();
-        // Each block of columns, `[steps, columns]`, in one piece.
+        // Each block of columns, `[steps, columns]`, is contiguous.
         let mut steps = workspace.floats.take(sum.count * image.columns);
         steps
             .par_chunks_mut((sum.count * width).max(1))
@@ -72,18 +72,18 @@ impl Imaging {
     }
 }
 
-/// One image in the making.
+/// Accumulator of one image.
 ///
-/// Columns are summed in blocks, each by one thread, with the sources of the neighbouring columns that lean into
-/// it; rows of a block are steps of [`Steps`].
+/// Columns are summed in blocks, each by one thread, with the sources of neighbouring columns that lean into it; the rows
+/// of a block are steps of [`Steps`].
 struct Sum<'a> {
     sources: &'a Sources<'a>,
     image: &'a Raster,
     response: Response,
     steps: Steps,
-    /// Columns that a source may be displaced by, rounded up.
+    /// Columns by which a source may be displaced, rounded up.
     lean: usize,
-    /// Steps before row 0 of the image, and after its last.
+    /// Steps before row 0 of the image and after its last row.
     pad: usize,
     /// Number of steps.
     count: usize,
@@ -112,12 +112,12 @@ impl<'a> Sum<'a> {
         }
     }
 
-    /// Columns of a block: enough blocks for many threads, few sources looked at twice.
+    /// Columns per block: enough blocks for many threads, few sources processed twice.
     fn block_width(&self) -> usize {
         (self.image.columns / 16).clamp(8, 32).max(2 * self.lean)
     }
 
-    /// Columns of the sources that can reach these columns of the image.
+    /// Columns of the sources that can reach the given columns of the image.
     fn reaching(&self, columns: &Range<usize>) -> Range<usize> {
         let to_source = |column: usize, lean: i64| {
             let j = column as i64 + lean - self.response.offset[1];
@@ -127,7 +127,7 @@ impl<'a> Sum<'a> {
         to_source(columns.start, -lean)..to_source(columns.end, lean)
     }
 
-    /// Writes the steps of these columns, `[steps, columns]`; `values` is a workspace.
+    /// Writes the steps of the given columns, `[steps, columns]`; `values` is a buffer.
     #[inline(always)]
     fn block(&self, columns: Range<usize>, values: &mut Vec<f32>, block: &mut [f32]) {
         let reaching = self.reaching(&columns);
@@ -148,7 +148,7 @@ impl<'a> Sum<'a> {
         lines.transpose(block);
     }
 
-    /// Where the sources of row `i` are imaged.
+    /// Computes where the sources of row `i` are imaged.
     #[inline(always)]
     fn place_row(&self, i: usize, row: &SourceRow<'_>, places: &mut Places) {
         let step = self.steps.step as f64;
@@ -228,13 +228,13 @@ impl<'a> Sum<'a> {
     }
 }
 
-/// Where the sources of a row are imaged.
+/// Positions at which the sources of a row are imaged.
 #[derive(Default)]
 struct Places {
-    /// Step at or before each source, and how far beyond it the source is, 0 to 1.
+    /// Step at or before each source, and the fraction of a step beyond it, 0 to 1.
     steps: Vec<i32>,
     fractions: Vec<f32>,
-    /// Columns that each source leans by, rounded down, and the share of the next column.
+    /// Columns by which each source leans, rounded down, and the share of the next column.
     columns: Vec<i32>,
     shares: Vec<f32>,
 }
@@ -248,7 +248,7 @@ impl Places {
     }
 }
 
-/// Takes positions `start + factor·value` apart: largest integers not above them, and the rest.
+/// Splits positions `start + factor·value` into the largest integers not above them and the remainders.
 #[inline(always)]
 fn split(whole: &mut [i32], rest: &mut [f32], start: f32, factor: f32, values: Option<&[f32]>) {
     let apart = |at: f32| (floor(at), at - floor(at) as f32);
@@ -265,14 +265,14 @@ fn split(whole: &mut [i32], rest: &mut [f32], start: f32, factor: f32, values: O
     }
 }
 
-/// Largest integer not above x: [`f32::floor`] is a call without SSE 4.1.
+/// Largest integer not above x; [`f32::floor`] is a function call without SSE 4.1.
 #[inline(always)]
 fn floor(x: f32) -> i32 {
     let cut = x as i32;
     cut - i32::from(x < cut as f32)
 }
 
-/// One row of the sources, cut to the columns that matter.
+/// One row of the sources, cut to the relevant columns.
 struct SourceRow<'a> {
     sigma0: &'a [f32],
     velocity: Option<&'a [f32]>,
@@ -299,7 +299,7 @@ fn value(row: Option<&[f32]>, column: usize) -> f32 {
     row.map_or(0.0, |row| row[column])
 }
 
-/// The taps of the last source, kept as long as the next has the same place between steps and the same width.
+/// The taps of the last source, kept while the next source has the same fraction of a step and the same width.
 #[derive(Default)]
 struct Taps {
     key: Option<(f32, f32)>,
@@ -307,7 +307,7 @@ struct Taps {
     count: usize,
     /// Taps before the step at or before the source.
     before: usize,
-    /// What makes their sum 1.
+    /// Factor that normalises their sum to 1.
     scale: f32,
 }
 
@@ -344,7 +344,7 @@ struct Lines<'a> {
 }
 
 impl Lines<'_> {
-    /// Adds `power × taps` from step `from` of a column on; what lies outside is lost.
+    /// Adds `power × taps` to a column from step `from`; parts outside are lost.
     #[inline(always)]
     fn add(&mut self, column: i32, from: usize, taps: &[f32], power: f32) {
         if column < 0 || column >= self.columns || from + taps.len() > self.count {
@@ -354,7 +354,7 @@ impl Lines<'_> {
         let line = &mut self.values[start..start + taps.len()];
         let groups = line.as_chunks_mut::<LANES>().0;
         for (line, taps) in groups.iter_mut().zip(taps.as_chunks::<LANES>().0) {
-            // Through copies: loads and stores of a group become one instruction each.
+            // Through copies, so that loads and stores of a group become one instruction each.
             let (mut sum, taps) = (*line, *taps);
             for (sum, tap) in sum.iter_mut().zip(taps) {
                 *sum += power * tap;

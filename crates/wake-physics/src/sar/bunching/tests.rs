@@ -17,7 +17,7 @@ const DEFAULT: Imaging = Imaging {
     },
 };
 
-/// σ⁰, velocity, acceleration and elevation of independent Gaussian pixels, of these deviations.
+/// σ⁰, velocity, acceleration and elevation of independent Gaussian pixels with given standard deviations.
 struct Scene {
     raster: Raster,
     sigma0: Field,
@@ -70,7 +70,7 @@ fn still(raster: Raster, sigma0: &Field) -> Sources<'_> {
     }
 }
 
-/// The tolerance is met at every level, for widths from half a pixel to many, sizes even, odd, prime and 1.
+/// The tolerance holds at all levels, for widths from half a pixel to many, and even, odd, prime and unit sizes.
 #[test]
 fn fast_sum_is_the_dense_sum() {
     let widths = [
@@ -96,7 +96,7 @@ fn fast_sum_is_the_dense_sum() {
             for tolerance in [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6] {
                 let fast = imaging.image(&scene.sources(), &image, tolerance);
                 let (_, rms) = fast.difference(&exact);
-                // Rounding of f32: places to 1e-6 of a pixel and sums of some hundred taps.
+                // Rounding to f32: positions to 1e-6 of a pixel, and sums of some hundred taps.
                 let allowed = (tolerance + 2e-6) * exact.mean();
                 assert!(
                     rms <= allowed,
@@ -107,7 +107,7 @@ fn fast_sum_is_the_dense_sum() {
     }
 }
 
-/// Errors fall with the tolerance, so the tolerance is what makes them.
+/// Errors fall with the tolerance, so the tolerance determines them.
 #[test]
 fn error_follows_the_tolerance() {
     let image = Raster::image(90, 60, 2.5);
@@ -117,11 +117,11 @@ fn error_follows_the_tolerance() {
         let fast = DEFAULT.image(&scene.sources(), &image, tolerance);
         fast.difference(&exact).1 / exact.mean()
     };
-    // Four decades of tolerance: at least two of error.
+    // Four decades of tolerance give at least two of error.
     assert!(error(1e-1) > 100.0 * error(1e-5));
 }
 
-/// All power arrives as long as nothing leaves the image: fast and dense.
+/// Power is conserved, fast and dense, as long as nothing leaves the image.
 #[test]
 fn power_is_conserved() {
     let inner = Raster::image(30, 24, 2.5);
@@ -134,7 +134,7 @@ fn power_is_conserved() {
             ..DEFAULT
         };
         let fast = imaging.image(&scene.sources(), &image, 1e-3);
-        // Sums of f32: every source keeps its power to some roundings, whatever the tolerance.
+        // Sums in f32: every source keeps its power within a few roundings, whatever the tolerance.
         assert!((fast.mean() * image.len() as f64 / power - 1.0).abs() < 3e-6);
         let dense = DirectImage::new(&imaging, &scene.sources(), &image).image();
         assert!((dense.mean() * image.len() as f64 / power - 1.0).abs() < 1e-6);
@@ -156,8 +156,8 @@ fn centre(image: &Field, raster: &Raster) -> [f64; 2] {
     [sums[0] / sums[2], sums[1] / sums[2]]
 }
 
-/// A patch that approaches is imaged (R/V)·`u_r` further along the flight: larger y, smaller row. One that is
-/// raised is imaged ζ cot θ nearer to the radar.
+/// A patch that approaches is imaged (R/V)·`u_r` further along the flight: larger y, smaller row. A raised patch is imaged
+/// ζ cot θ nearer to the radar.
 #[test]
 fn a_moving_patch_is_displaced() {
     let raster = Raster::image(201, 61, 2.5);
@@ -177,7 +177,7 @@ fn a_moving_patch_is_displaced() {
             let [x, y] = centre(&image, &raster);
             let moved = 78.0 * f64::from(velocity);
             let leaned = -f64::from(elevation) / 0.5585f64.tan();
-            // What the tolerance leaves out lies at most some standard deviations (14 m) away.
+            // Power omitted by the tolerance lies at most a few standard deviations (14 m) away.
             assert!(
                 (y - moved).abs() < 1e-2 && (x - leaned).abs() < 1e-3,
                 "{x} {y}"
@@ -205,7 +205,7 @@ fn a_point_is_as_wide_as_the_resolution() {
     assert!((variance / (rho * rho / (2.0 * PI * PI)) - 1.0).abs() < 1e-4);
 }
 
-/// R/V = 0 and no motion: σ⁰ seen with the nominal resolution, a uniform sea unchanged.
+/// With R/V = 0 and no motion, σ⁰ is imaged at the nominal resolution, and a uniform sea is unchanged.
 #[test]
 fn without_a_synthetic_aperture_nothing_moves() {
     let image = Raster::image(40, 30, 2.5);
@@ -231,7 +231,7 @@ fn without_a_synthetic_aperture_nothing_moves() {
     assert!(image.values.iter().all(|v| (v / 0.04 - 1.0).abs() < 2e-5));
 }
 
-/// What is imaged out of sight leaves the image empty; nothing comes back around.
+/// Sources displaced out of the image leave it empty; nothing wraps around.
 #[test]
 fn nothing_wraps() {
     let image = Raster::image(50, 40, 2.5);
@@ -258,7 +258,7 @@ fn threads_do_not_change_the_image() {
     assert_eq!(with(1), with(3));
 }
 
-/// Amplitude of the wave of `waves` periods over the rows of an image, mean over its columns, relative to its mean.
+/// Amplitude of a wave with `waves` periods over the rows of an image, averaged over columns, relative to the mean.
 fn amplitude(image: &Field, waves: f64) -> [f64; 2] {
     let mut sums = [0.0; 2];
     for i in 0..image.rows {
@@ -272,8 +272,8 @@ fn amplitude(image: &Field, waves: f64) -> [f64; 2] {
     sums.map(|v| 2.0 * v / (count * image.mean()))
 }
 
-/// The azimuth cut-off from nothing but displaced pixels: a pattern of σ⁰ over a sea of random velocities, and the
-/// crests that velocity bunching makes of a weak swell, keep exp(−k²β²σ²) of their power, besides the resolution.
+/// The azimuth cut-off from displaced pixels alone: a pattern of σ⁰ over a sea of random velocities, and the crests that
+/// velocity bunching makes of a weak swell, keep exp(−k²β²σ²) of their power, apart from the resolution.
 #[test]
 fn monte_carlo_meets_the_quasi_linear_cutoff() {
     let image = Raster::image(256, 256, 5.0);
@@ -296,15 +296,15 @@ fn monte_carlo_meets_the_quasi_linear_cutoff() {
             ..still(raster, &pattern)
         };
         let seen = amplitude(&imaging.image(&sources, &image, 1e-4), waves);
-        // Every one of 65,536 sources has a random phase: standard error √(2·1.5/65,536) = 0.007 at most.
+        // Each of the 65,536 sources has a random phase: standard error √(2·1.5/65,536) = 0.007 at most.
         assert!(
             (seen[0] - expected).abs() < 0.02,
             "{waves}: {seen:?} {expected}"
         );
         assert!(seen[1].abs() < 0.02);
 
-        // A swell of velocity u cos(kr), r down the rows: y' = y + βu, so the row falls, dr = −βu. To first order
-        // the density is 1 + d(βu cos kr)/dr = 1 − kβu sin(kr).
+        // A swell of velocity u cos(kr), r down the rows: y' = y + βu, so the row decreases, dr = −βu. To first order the
+        // density is 1 + d(βu cos kr)/dr = 1 − kβu sin(kr).
         let swell = 0.2 / (k * 78.0);
         let moving = Field::from_fn(&raster, |i, j| {
             (swell * crest(i).cos()) as f32 + noise.at(i, j)
@@ -324,8 +324,8 @@ fn monte_carlo_meets_the_quasi_linear_cutoff() {
     }
 }
 
-/// What coherence smears is what bunching by the same velocities smears: an image of unresolved random
-/// velocities has, on average, the response of [`AzimuthResolution::of_moving_sea`].
+/// The smear by loss of coherence equals bunching by the same velocities: an image of unresolved random velocities has, on
+/// average, the response of [`AzimuthResolution::of_moving_sea`].
 #[test]
 fn coherence_is_bunching_by_unresolved_waves() {
     let raster = Raster::image(257, 400, 2.5);
@@ -353,7 +353,7 @@ fn coherence_is_bunching_by_unresolved_waves() {
     };
     let bunched = spread(&at_rest.image(&resolved, &raster, 1e-5));
     let smeared = spread(&unresolved.image(&still(raster, &line), &raster, 1e-5));
-    // A standard deviation from 400 samples: 1/√800 = 3.5 %; two of them and a half.
+    // A standard deviation from 400 samples errs by 1/√800 = 3.5 %; the limit is two and a half times that.
     assert!(
         (bunched / smeared - 1.0).abs() < 0.09,
         "{bunched} {smeared}"

@@ -1,4 +1,4 @@
-//! What is known beside what was found, as a picture.
+//! Pictures of known wakes and detections.
 
 use image::RgbImage;
 
@@ -7,11 +7,10 @@ use wake_detector::GreyImage;
 use wake_detector::drawing::Drawing;
 use wake_detector::{Detection, Wake};
 
-/// The colour of wakes that are known.
+/// Colour of known wakes.
 const KNOWN: [u8; 3] = [0, 200, 0];
 
-/// An image with the wakes that are to be found in green, and in red and yellow what was found with certainty
-/// ([`Detection::sure`]).
+/// Draws the wakes that count in green, and confident detections ([`Detection::sure`]) in red and yellow.
 #[must_use]
 pub fn compared(image: &GreyImage, wakes: &[Wake], found: &[Detection]) -> RgbImage {
     let mut drawing = Drawing::new(image);

@@ -4,7 +4,7 @@ use serde::Serialize;
 use wake_detector::Detection;
 use wake_physics::Scene;
 
-/// Sea without ships that was searched.
+/// Searched sea without ships.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct EmptySea {
     /// Number of images.
@@ -16,7 +16,7 @@ pub struct EmptySea {
 }
 
 impl EmptySea {
-    /// Counts the detections of a score or more in the images for which `counts` is true.
+    /// Counts the detections of at least `least_score` in the images for which `counts` is true.
     #[must_use]
     pub fn count(
         scenes: &[Scene],
@@ -58,7 +58,7 @@ impl EmptySea {
     }
 }
 
-/// Chance of no more than `count` events where `mean` are expected.
+/// Probability of no more than `count` events where `mean` are expected.
 fn poisson_below(count: usize, mean: f64) -> f64 {
     let mut term = (-mean).exp();
     let mut sum = term;
@@ -75,14 +75,14 @@ fn area(scene: &Scene) -> f64 {
     (grid.rows * grid.columns) as f64 * grid.spacing * grid.spacing * 1e-6
 }
 
-/// The smallest score from which on sea without ships has no more than `rate` false alarms per 1,000 km², not below `least`.
+/// Smallest threshold, at least `least`, at which sea without ships has no more than `rate` false alarms per 1,000 km².
 #[must_use]
 pub fn score_for(scenes: &[Scene], found: &[Vec<Detection>], rate: f64, least: f32) -> f32 {
     let area: f64 = scenes.iter().map(area).sum();
     let allowed = (rate * area * 1e-3).floor() as usize;
     let mut scores: Vec<f32> = found.iter().flatten().map(|one| one.score).collect();
     scores.sort_by(|a, b| b.total_cmp(a));
-    // Above the first one that is not allowed.
+    // Just above the first score that is one too many.
     scores
         .get(allowed)
         .map_or(least, |score| score.next_up())
@@ -122,7 +122,7 @@ mod tests {
             EmptySea::count(&scenes, &found, 0.25, |_| true).false_alarms,
             2
         );
-        // 5 per 1,000 km² are two on 400: the third score is the first that is not sure.
+        // 5 per 1,000 km² are two on 400: the threshold lies above the third score.
         let sure = score_for(&scenes, &found, 5.0, 0.0);
         assert!(sure > 0.2 && sure < 0.21, "{sure}");
         assert!((score_for(&scenes, &found, 5.0, 0.35) - 0.35).abs() < 1e-9);

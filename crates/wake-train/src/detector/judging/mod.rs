@@ -1,4 +1,4 @@
-//! How well finders find wakes: images whose wakes are known, simulated or labelled by people, searched and judged.
+//! Scoring of finders on images whose wakes are known, simulated or labelled by people.
 //!
 //! ```text
 //! recipe ─► images with their wakes ─┐

@@ -5,10 +5,10 @@ use std::ops::Range;
 use wake_detector::GreyImage;
 use wake_physics::measure::median;
 
-/// A window with a pixel brighter than this many medians holds more than sea: chosen.
+/// A window with a pixel brighter than this many medians is not open sea: chosen.
 const BRIGHTEST: f32 = 4.0;
 
-/// The windows of open sea between some columns of an image, side by side and in rows, each with its levels in rows.
+/// The windows of open sea in a range of columns of an image, on a grid without overlap, each with its levels row by row.
 ///
 /// - `mask`: of the image's size; windows with a level above 0 in it are left out
 /// - `side`: rows and columns of a window
@@ -38,10 +38,11 @@ pub fn open_windows(
     open
 }
 
-/// As many windows of open sea from the left half of an image as from its right half, in turn: a network that learns from the
-/// even ones is judged on a half that it has not seen.
+/// Windows of open sea from the left and the right half of an image alternately, equally many of both.
 ///
-/// - `most`: windows of a half, at most; where there are more, they are taken from all over it
+/// A network trained on the even windows is thus tested on a half that it has not seen.
+///
+/// - `most`: largest number of windows per half, spread over it
 #[must_use]
 pub fn paired_windows(
     image: &GreyImage,
@@ -61,7 +62,7 @@ pub fn paired_windows(
     pairs.flat_map(|(left, right)| [left, right]).collect()
 }
 
-/// Whether a window holds no bright target, and more than one grey.
+/// Whether a window has no bright target, and more than one grey.
 fn is_open(pixels: &[f32]) -> bool {
     if pixels.is_empty() {
         return false;
@@ -86,7 +87,7 @@ mod tests {
         assert!(!is_open(&ship) && !is_open(&[0.0; 64]) && !is_open(&[9.0; 64]));
     }
 
-    /// Of an image whose left half is dark and right half bright, even windows are dark and odd ones bright.
+    /// For an image whose left half is dark and right half bright, even windows are dark and odd ones bright.
     #[test]
     fn halves_are_kept_apart_and_masks_are_heeded() {
         let (rows, columns) = (300, 2 * SIDE + 40);

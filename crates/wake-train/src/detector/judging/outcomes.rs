@@ -1,4 +1,4 @@
-//! What detections turned out to be: wakes or false alarms, in the right direction or reversed.
+//! Outcomes of detections: wakes or false alarms, in the right direction or reversed.
 
 use rayon::prelude::*;
 use wake_dataset::{Pair, Source};
@@ -10,20 +10,20 @@ use super::simulated::known;
 use crate::detector::Sample;
 use crate::error::Result;
 
-/// A detection and what it turned out to be.
+/// A detection and its outcome.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DetectionOutcome {
     /// Number of the image.
     pub image: usize,
     /// The detection.
     pub detection: Detection,
-    /// Whether it is a wake, by the ray rule, in either direction; a second detection of a wake is none.
+    /// Whether it is a wake by the ray rule, in either direction; a second detection of the same wake is not.
     pub wake: bool,
     /// Whether its direction is right; `None` for false alarms and for wakes whose direction is unknown.
     pub direction: Option<bool>,
 }
 
-/// Images whose wakes are known, searched.
+/// Images with known wakes, and their detections.
 #[derive(Debug, Clone, Default)]
 pub struct KnownImages {
     /// The wakes of each image.
@@ -41,9 +41,9 @@ const AT_ONCE: u64 = 16;
 pub type Spacing<'a> = dyn Fn(&Scene) -> Option<f32> + Sync + 'a;
 
 impl KnownImages {
-    /// Searches the first `count` images of a source, all of them square, once for each of the spacings.
+    /// Searches the first `count` images of a source, all of them square, once for each spacing.
     ///
-    /// - `done`: called with the number of images after some of them
+    /// - `done`: called with the number of images after each batch
     ///
     /// # Errors
     ///
@@ -160,8 +160,7 @@ mod tests {
         }
     }
 
-    /// A wake found, one found from its end, one found twice, and nothing: right and right way, right and reversed, right and then
-    /// wrong, wrong.
+    /// A wake found, a wake found in reverse, a second detection of the first wake, and a false alarm.
     #[test]
     fn reversed_wakes_are_wakes_of_the_wrong_direction() {
         let labels = [wake([100.0, 100.0], 90.0), wake([300.0, 300.0], 0.0)];

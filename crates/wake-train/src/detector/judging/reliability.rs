@@ -1,4 +1,4 @@
-//! How well probabilities agree with what happened.
+//! Reliability of predicted probabilities.
 
 use serde::Serialize;
 use wake_nn::noise::NoiseSource;
@@ -19,13 +19,13 @@ pub struct ReliabilityBin {
 pub struct Reliability {
     /// Number of predictions.
     pub count: usize,
-    /// Bins of equal width from 0 to 1; empty ones are there.
+    /// Bins of equal width from 0 to 1, including empty ones.
     pub bins: Vec<ReliabilityBin>,
-    /// Mean distance of predicted and observed over the bins, weighted with their counts.
+    /// Expected calibration error: mean distance of predicted and observed over the bins, weighted with their counts.
     pub calibration_error: f64,
-    /// Mean square of probability less outcome.
+    /// Brier score: mean square of probability less outcome.
     pub brier: f64,
-    /// The same of one probability for all: the share that was right.
+    /// Brier score of a constant probability, the share that was right.
     pub brier_of_constant: f64,
 }
 
@@ -36,12 +36,12 @@ const DRAWS: u32 = 1000;
 const SEED: u64 = 5;
 
 impl Reliability {
-    /// The reliability of probabilities and whether each prediction was right; `None` without any.
+    /// The reliability of predictions, each a probability and whether it was right; `None` without any.
     ///
     /// # References
     ///
-    /// Brier (1950), "Verification of forecasts expressed in terms of probability"; Naeini, Cooper & Hauskrecht (2015), "Obtaining
-    /// well calibrated probabilities using Bayesian binning" (calibration error).
+    /// Brier (1950), "Verification of forecasts expressed in terms of probability"; Naeini, Cooper & Hauskrecht (2015),
+    /// "Obtaining well calibrated probabilities using Bayesian binning" (calibration error).
     #[must_use]
     pub fn of(predictions: &[(f64, bool)]) -> Option<Self> {
         let count = predictions.len();
@@ -82,7 +82,7 @@ impl Reliability {
     }
 }
 
-/// The 95 % interval of a figure of groups of predictions, by drawing as many groups with replacement.
+/// The 95 % bootstrap interval of a figure, drawing groups of predictions with replacement.
 ///
 /// - `groups`: predictions that depend on each other, such as those of an image
 ///

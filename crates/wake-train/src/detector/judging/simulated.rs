@@ -16,8 +16,10 @@ use wake_detector::{Detection, Wake};
 /// Images searched at a time.
 const AT_ONCE: u64 = 16;
 
-/// A wake as the rules see it: it counts where it can be seen and begins inside a square image of `size` pixels a side; one
-/// that begins outside has no end that is known to be its tip.
+/// Label of a wake in a square image of `size` pixels a side.
+///
+/// It counts if the wake is strong enough ([`FOUND`]) and begins inside; the direction of a wake that begins outside is
+/// ambiguous.
 #[must_use]
 pub fn known(wake: &Wake, size: usize) -> Label {
     let inside = wake
@@ -32,23 +34,23 @@ pub fn known(wake: &Wake, size: usize) -> Label {
     }
 }
 
-/// Simulated images that were searched.
+/// Searched images with their detections.
 #[derive(Debug, Clone, Default)]
 pub struct Searched {
-    /// Of each finder its images, all in the same order.
+    /// For each finder the images with its detections, all in the same order.
     pub judged: Vec<Vec<Judged>>,
     /// The wakes of each image, as many as it has labels.
     pub wakes: Vec<Vec<Wake>>,
     /// The scene of each image.
     pub scenes: Vec<Scene>,
-    /// Seconds per image of the first finder, working alone.
+    /// Seconds per image of the first finder alone.
     pub seconds: f64,
 }
 
 impl Searched {
     /// Searches the first `count` images of a source, all of them square.
     ///
-    /// - `done`: called with each image, its wakes and what each finder has found, in order
+    /// - `done`: called with each image, its wakes and the detections of each finder, in order
     ///
     /// # Errors
     ///
@@ -100,7 +102,7 @@ impl Searched {
 
     /// The images of one finder with all but the clear wakes ignored.
     ///
-    /// - `contrast_db`: above which contrast a wake is clear \[dB\]
+    /// - `contrast_db`: contrast above which a wake is clear \[dB\]
     ///
     /// # Panics
     ///
@@ -119,7 +121,7 @@ impl Searched {
     }
 }
 
-/// What the first finder takes for an image \[s\].
+/// Time of the first finder per image \[s\].
 fn seconds(finders: &[&dyn Finder], images: &[GreyImage]) -> f64 {
     let begin = Instant::now();
     for image in images {

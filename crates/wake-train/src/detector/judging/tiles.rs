@@ -1,4 +1,4 @@
-//! Real tiles, with the wakes that people have labelled in `labels.json` beside them.
+//! Real tiles with wakes labelled by people in `labels.json`.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,25 +11,25 @@ use wake_detector::GreyImage;
 use wake_detector::Wake;
 use wake_detector::score::{Judged, Label, Point, Ray};
 
-/// A tile and what is known of it.
+/// A tile and its labels.
 #[derive(Debug, Clone)]
 pub struct Tile {
     /// Name of its file.
     pub name: String,
     /// The tile.
     pub image: GreyImage,
-    /// Its clear wakes counting, all others ignored.
+    /// Labels of which only the clear wakes count.
     pub clear: Judged,
-    /// The same with the probable wakes counting, too.
+    /// Labels of which the clear and the probable wakes count.
     pub probable: Judged,
 }
 
 impl Tile {
-    /// The tiles of a folder, by name.
+    /// Reads the tiles of a folder, sorted by name.
     ///
     /// # Errors
     ///
-    /// [`Error::Model`] where there is no `labels.json` or one of more than 16 MiB, [`Error::Labels`] for one of another
+    /// [`wake_nn::Error::Io`] where there is no `labels.json` or one of more than 16 MiB, [`Error::Labels`] for one of another
     /// form, and as [`GreyImage::read`].
     pub fn read_all(folder: &Path) -> Result<Vec<Self>> {
         let tile = |(name, known): (String, KnownTile)| {
@@ -43,7 +43,7 @@ impl Tile {
         labels(folder)?.into_iter().map(tile).collect()
     }
 
-    /// The clear and the probable wakes, as they are drawn.
+    /// The clear and the probable wakes, for drawing.
     #[must_use]
     pub fn wakes(&self) -> Vec<Wake> {
         let wake = |label: &Label| Wake {
@@ -59,7 +59,7 @@ impl Tile {
     }
 }
 
-/// The content of `labels.json`; more keys are allowed.
+/// The content of `labels.json`; other keys are ignored.
 #[derive(Deserialize)]
 struct Labels {
     images: BTreeMap<String, KnownTile>,
@@ -82,7 +82,7 @@ struct KnownWake {
     oriented_box: Option<[Point; 4]>,
 }
 
-/// How sure the labeller was.
+/// Confidence of the labeller.
 #[derive(Deserialize, Debug, Clone, Copy, PartialEq, Eq)]
 #[serde(rename_all = "lowercase")]
 enum Confidence {

@@ -5,9 +5,9 @@ use wake_physics::Field;
 
 use super::features::{feature_groups, features};
 
-/// Part of the pooled variance that is added to every variance: features may depend on each other, and windows are few.
+/// Share of the pooled variance that is added to every variance, since features may depend on each other and windows are few.
 const RIDGE: f64 = 0.1;
-/// Standard errors on each side of the interval: 95 of 100 normal numbers.
+/// Standard errors on each side of a 95 % interval.
 const STANDARD_ERRORS: f64 = 1.96;
 
 /// Accuracy of a linear discriminant of a group of features.
@@ -15,15 +15,16 @@ const STANDARD_ERRORS: f64 = 1.96;
 pub struct GroupAccuracy {
     /// Name of the group, or "all".
     pub group: &'static str,
-    /// Mean over the images left out of the shares of real and of other windows that are classified right: ½ where the kinds
-    /// are alike, 1 where every window tells them apart.
+    /// Mean over the images left out of the shares of real and of other windows that are classified correctly: ½ where the kinds
+    /// are alike, 1 where no window is mistaken.
     pub accuracy: f64,
-    /// Half of the width of its 95 % interval, from the spread over the images left out.
+    /// Half-width of its 95 % interval, from the spread over the images left out.
     pub half_width: f64,
 }
 
-/// Fisher's linear discriminant between the windows of real images and others, each real image left out in turn together with
-/// its share of the others; by groups of features, and by all of them.
+/// Accuracy of Fisher's linear discriminant between windows of real images and others, by groups of features and by all of them.
+///
+/// Each real image is left out in turn, together with its share of the others.
 ///
 /// - `real`: the windows of each image, at least two images that have some
 /// - `others`: at least as many windows as images
@@ -65,7 +66,7 @@ pub fn discriminant(real: &[Vec<Field>], others: &[Field]) -> Vec<GroupAccuracy>
         .collect()
 }
 
-/// Accuracy and half of its interval over the images left out.
+/// Accuracy and half-width of its interval over the images left out.
 fn left_out(real: &[Vec<Vec<f64>>], others: &[Vec<f64>]) -> [f64; 2] {
     let folds = real.len();
     let accuracy = |out: usize| {
@@ -94,7 +95,7 @@ fn share(windows: &[&Vec<f64>], right: impl Fn(&[f64]) -> bool) -> f64 {
     count as f64 / windows.len().max(1) as f64
 }
 
-/// A direction and the place on it that halves the way between two means.
+/// A direction, and the midpoint between two means.
 struct Line {
     middle: Vec<f64>,
     direction: Vec<f64>,
@@ -133,7 +134,7 @@ impl Line {
         }
     }
 
-    /// Above 0 on the side of the first mean.
+    /// Position along the direction, above 0 on the side of the first mean.
     fn at(&self, x: &[f64]) -> f64 {
         let off = x.iter().zip(&self.middle).map(|(x, m)| x - m);
         off.zip(&self.direction).map(|(x, w)| x * w).sum()
@@ -197,8 +198,8 @@ mod tests {
         (first..first + count).map(window).collect()
     }
 
-    /// Two halves of one kind are told apart half of the time within four errors of a share of 48 windows, √(¼/48); smoothed noise
-    /// by its power near Nyquist always.
+    /// Two sets of one kind are classified with an accuracy of ½, within four errors of a share of 48 windows, √(¼/48); smoothed
+    /// noise is always classified correctly by its power near Nyquist.
     #[test]
     fn kinds_that_differ_are_told_apart_by_what_differs() {
         let real: Vec<Vec<Field>> = (0..6).map(|n| windows(8 * n, 8, false)).collect();

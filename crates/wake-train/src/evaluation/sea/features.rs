@@ -1,10 +1,10 @@
-//! Numbers of a window of sea, in groups, that a linear discriminant tells kinds of sea apart by.
+//! Features of a window of sea, in groups, for a linear discriminant between kinds of sea.
 
 use std::ops::Range;
 
 use wake_physics::Field;
 
-/// Distances of the correlations of the texture, and of the mottle \[pixels\].
+/// Lags of the correlations of texture and of mottle \[pixels\].
 const TEXTURE: [usize; 4] = [3, 4, 6, 8];
 const MOTTLE: [usize; 3] = [16, 24, 32];
 /// Side of JPEG's blocks \[pixels\].
@@ -12,12 +12,12 @@ const BLOCK: usize = 8;
 /// Side of the squares over which the mottle is averaged \[pixels\].
 const SQUARE: usize = 4;
 
-/// A group of features: its name and its places among [`features`].
+/// A group of features: its name and its indices in [`features`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct FeatureGroup {
     /// Name in reports.
     pub name: &'static str,
-    /// Places of its features.
+    /// Indices of its features.
     pub places: Range<usize>,
 }
 
@@ -40,8 +40,9 @@ pub fn feature_groups() -> Vec<FeatureGroup> {
     sizes.into_iter().map(group).collect()
 }
 
-/// The features of a window of levels of 8 bits, in the order of [`feature_groups`]. None changes with brightness; those of the
-/// histogram alone change with contrast.
+/// The features of a window of levels of 8 bits, in the order of [`feature_groups`].
+///
+/// None depends on a common factor of the levels, up to rounding; only those of the histogram depend on contrast.
 ///
 /// - `window`: at least 64 rows and columns
 #[must_use]
@@ -63,7 +64,7 @@ enum Axis {
     Columns,
 }
 
-/// Sums (`sign` = 1) or differences (−1) of neighbours, half of each.
+/// Half the sum (`sign` = 1) or difference (−1) of neighbours.
 fn neighbours(field: &Field, axis: Axis, sign: f32) -> Field {
     let (rows, columns, step) = match axis {
         Axis::Rows => (field.rows, field.columns - 1, 1),
@@ -80,7 +81,7 @@ fn neighbours(field: &Field, axis: Axis, sign: f32) -> Field {
     }
 }
 
-/// The field through `high` differences and `low` sums along an axis: response (sin πf)^high (cos πf)^low.
+/// Applies `high` differences and `low` sums along an axis: response (sin πf)^high (cos πf)^low.
 fn filtered(field: &Field, axis: Axis, high: usize, low: usize) -> Field {
     let signs = std::iter::repeat_n(-1.0, high).chain(std::iter::repeat_n(1.0, low));
     signs.fold(field.clone(), |field, sign| neighbours(&field, axis, sign))
@@ -111,8 +112,8 @@ fn nyquist(window: &Field) -> Vec<f64> {
     ]
 }
 
-/// Largest step from pixel to pixel among the eight places in a block over the median of them, along both axes; roughness of the
-/// histogram; share of empty levels.
+/// Logarithm of the largest over the median step from pixel to pixel among the eight places in a block, along both axes;
+/// roughness of the histogram; share of empty levels.
 fn compression(window: &Field) -> Vec<f64> {
     let steps = |axis: Axis| {
         let field = neighbours(window, axis, -1.0);
@@ -132,7 +133,7 @@ fn compression(window: &Field) -> Vec<f64> {
     for &value in &window.values {
         counts[value.round().clamp(0.0, 255.0) as usize] += 1.0;
     }
-    // The levels between the fifths of a hundred at both ends.
+    // Levels between the 5th and the 95th percentile.
     let total = window.values.len() as f64;
     let mut sum = 0.0;
     let inside = |&level: &usize| {
@@ -150,13 +151,13 @@ fn compression(window: &Field) -> Vec<f64> {
     vec![
         steps(Axis::Rows),
         steps(Axis::Columns),
-        // Of Poisson counts of N pixels in L levels: what is left after the scatter that chance makes.
+        // Over the scatter of Poisson counts of N pixels in L levels.
         (roughness / (1.5 * count / total).sqrt()).ln_1p(),
         empty as f64 / count,
     ]
 }
 
-/// The field less its mean over squares of 17 pixels, so that the mottle is not in it.
+/// The field less its mean over squares of 17 pixels, which removes the mottle.
 fn detail(window: &Field) -> Field {
     const HALF: usize = 8;
     let along = |values: &[f32]| -> Vec<f32> {
@@ -190,7 +191,7 @@ fn detail(window: &Field) -> Field {
     Field { values, ..*window }
 }
 
-/// Correlation of pixels `lag` apart along an axis, over `variance`.
+/// Covariance of pixels `lag` apart along an axis, over `variance`.
 fn correlation(field: &Field, axis: Axis, lag: usize, variance: f64) -> f64 {
     let mean = field.mean();
     let at = |i: usize, j: usize| f64::from(field.values[i * field.columns + j]) - mean;
@@ -219,7 +220,7 @@ fn texture(window: &Field) -> Vec<f64> {
     correlations(&detail, &TEXTURE, variance)
 }
 
-/// Spread over mean, skewness, excess kurtosis, and the levels of 1 and 99 % in standard deviations.
+/// Spread over mean, skewness, excess kurtosis, and the 1st and 99th percentiles in standard deviations.
 fn histogram(window: &Field) -> Vec<f64> {
     let (mean, deviation) = (window.mean(), variance(window).sqrt().max(1e-9));
     let moment = |power: i32| {
@@ -287,7 +288,7 @@ mod tests {
         features(window)[group.expect("a group").places.clone()].to_vec()
     }
 
-    /// The filters' gains by quadrature of their responses over white noise; Poisson noise of the means of 16,384 pixels.
+    /// The filters' gains over white noise are computed by quadrature of their responses.
     #[test]
     fn white_noise_has_the_power_of_the_filters() {
         let gain = |high: i32, low: i32| -> f64 {
@@ -305,7 +306,7 @@ mod tests {
         ];
         let found = of("power", &white(1));
         for (found, expected) in found.iter().zip(expected) {
-            // A filter of six taps an axis keeps a quarter of the independent pixels: four errors of √(2/1000).
+            // A filter of six taps per axis keeps a quarter of the independent pixels along it: four errors of √(2/1000).
             assert!((found - expected).abs() < 0.2, "{found} {expected}");
         }
     }
@@ -328,11 +329,11 @@ mod tests {
         }
     }
 
-    /// Lags of white noise are 0, of noise smoothed over a few columns they are those of the smoothing.
+    /// Correlations of white noise are 0; those of noise smoothed over a few columns follow from the smoothing.
     #[test]
     fn lags_are_correlations_along_both_axes() {
         let white = white(3);
-        // Means of 16,384 products: five errors of 1/128. The mean that is taken away leaves −2/17² and less.
+        // Means of 16,384 products: five errors of 1/128. Subtracting the local mean leaves −2/17² and less.
         assert!(of("lags", &white).iter().all(|r| r.abs() < 0.05));
         let smooth = filtered(&white, Axis::Rows, 0, 4);
         let found = of("lags", &smooth);

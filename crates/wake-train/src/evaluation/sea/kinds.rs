@@ -19,13 +19,14 @@ const OPEN_SEA: [&str; 4] = [
     "draw.count = 0",
     "draw.sea.slick_damping = 0",
 ];
-/// A level that is black in no quick-look of the recipe: linear seas are shown with it as their median.
+/// Median grey of linear seas, a level that is black in no quick-look of the recipe.
 const LINEAR_GREY: f64 = 0.3;
 
-/// Every kind of sea by name, as many windows as there are pairs, in levels of 8 bits: the left windows themselves, the
-/// learnt sea of their styles and of its own, Gaussian noise of their correlations, white speckle of their looks, the
-/// simulated open sea of the recipe `satellites`, and a linear sea under that recipe's speckle. What is drawn like a left
-/// window has its median.
+/// Windows of every kind of sea by name, one for each pair, in levels of 8 bits.
+///
+/// The kinds are the left windows themselves, the learnt sea of their styles and of its own, Gaussian noise of their
+/// correlations, white speckle of their looks, the simulated open sea of the recipe `satellites`, and a linear sea under that
+/// recipe's speckle. Windows drawn after a left window have its median.
 ///
 /// - `seed`: of the first window of each kind
 ///
@@ -95,7 +96,7 @@ fn amplitude(intensity: &Field) -> Field {
     }
 }
 
-/// Speckle that no pixel shares with its neighbour, of the window's equivalent looks, to a whole one.
+/// Uncorrelated speckle of the window's equivalent number of looks, rounded to a whole number.
 fn white_speckle(like: &Field, seed: u64) -> Field {
     let looks = texture(like, WINDOW).map_or(1.0, |texture| texture.looks);
     let mut field = window(vec![1.0; WINDOW * WINDOW]);
@@ -103,7 +104,7 @@ fn white_speckle(like: &Field, seed: u64) -> Field {
     amplitude(&field)
 }
 
-/// Amplitudes as the levels of a quick-look whose median is that of the pair's left window.
+/// Scales amplitudes to the median of the pair's left window, and rounds them to levels of a quick-look.
 fn levels(mut amplitude: Field, pair: &SeaPair) -> Field {
     let factor = pair.median as f32 / median(&amplitude.values).max(f32::MIN_POSITIVE);
     for value in &mut amplitude.values {
@@ -112,7 +113,7 @@ fn levels(mut amplitude: Field, pair: &SeaPair) -> Field {
     amplitude
 }
 
-/// The levels of grey.
+/// Levels of grey as a window.
 fn levels_of(grey: &Grey) -> Field {
     window(grey.levels().into_iter().map(f32::from).collect())
 }
@@ -138,7 +139,7 @@ fn linear(scene: &Scene) -> Result<Field> {
 mod tests {
     use super::*;
 
-    /// White speckle of four looks, as a window and drawn like it: the looks come back, and the median is the window's.
+    /// White speckle drawn after a window of four looks has its looks and its median.
     #[test]
     fn white_speckle_has_the_looks_and_the_median_of_its_window() {
         let left = {
@@ -156,7 +157,7 @@ mod tests {
         let drawn = levels(white_speckle(&pair.left, 2), &pair);
         assert!((f64::from(median(&drawn.values)) - pair.median).abs() <= 0.5);
         let looks = texture(&drawn, WINDOW).unwrap().looks;
-        // A variance of 128² pixels has an error of 1.1 %, steps of one level add less.
+        // A variance of 128² pixels has an error of 1.1 %; rounding to levels adds less.
         assert!((looks - 4.0).abs() < 0.3, "{looks}");
         let noise = gaussian_amplitude(&pair.style, 3);
         assert!((noise.mean() - f64::from(pair.style.mean())).abs() < 0.02);

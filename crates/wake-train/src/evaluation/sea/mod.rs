@@ -1,4 +1,4 @@
-//! How like the sea of real images a learnt, a simulated and a Gaussian one are.
+//! Comparison of learnt, simulated and Gaussian seas with the sea of real images.
 //!
 //! ```text
 //! left half ─► what is learnt, styles and levels ─► kinds of sea ─┐

@@ -1,4 +1,4 @@
-//! Windows of open sea of both halves of an image.
+//! Windows of open sea from both halves of an image.
 
 use wake_physics::Field;
 
@@ -7,20 +7,20 @@ use wake_ldm::sea_texture::{SeaImage, SeaStyle, WINDOW};
 /// A real window of a left half, and one of the right half of the same image, both of [`WINDOW`] rows and columns.
 #[derive(Debug, Clone)]
 pub struct SeaPair {
-    /// Amplitudes of the left one, of the image's scale.
+    /// Amplitudes of the left window, in the image's scale.
     pub left: Field,
-    /// Amplitudes of the right one.
+    /// Amplitudes of the right window.
     pub right: Field,
-    /// Style of the left one.
+    /// Style of the left window.
     pub style: SeaStyle,
-    /// Median of the left one.
+    /// Median of the left window.
     pub median: f64,
 }
 
 impl SeaPair {
-    /// Windows of open sea of both halves of an image, as many of each, spread over them.
+    /// Pairs of windows of open sea, spread over both halves of an image.
     ///
-    /// - `most`: no more pairs than these
+    /// - `most`: largest number of pairs
     #[must_use]
     pub fn of_image(left: &SeaImage, right: &SeaImage, most: usize) -> Vec<Self> {
         let [left, right] = [left, right].map(|half| -> Vec<(Field, SeaStyle)> {
@@ -44,7 +44,7 @@ impl SeaPair {
     }
 }
 
-/// A window of so many amplitudes.
+/// Window of the given amplitudes.
 pub(super) fn window(values: Vec<f32>) -> Field {
     Field {
         rows: WINDOW,

@@ -1,4 +1,4 @@
-//! What one kind of sea looks like.
+//! Figures of one kind of sea.
 
 use serde::Serialize;
 use wake_physics::Field;
@@ -12,9 +12,9 @@ use wake_ldm::sea_texture::WINDOW;
 pub struct SeaRow {
     /// Name of the kind.
     pub kind: &'static str,
-    /// Against the right halves; `None` of these themselves.
+    /// Two-sample test against the right halves; `None` for the right halves themselves.
     pub two_sample: Option<TwoSample>,
-    /// Root mean square over the rings of the difference of the mean radial spectrum, of windows of variance 1 \[dB\].
+    /// Root mean square difference from the reference's mean radial spectrum, over rings of windows of variance 1 \[dB\].
     pub spectrum_db: f64,
     /// Correlation of speckle one and two pixels apart, along rows and along columns.
     pub correlations: [f64; 4],
@@ -25,9 +25,9 @@ pub struct SeaRow {
 }
 
 impl SeaRow {
-    /// The row of some windows of [`WINDOW`] rows and columns.
+    /// Figures of windows of [`WINDOW`] rows and columns.
     ///
-    /// - `reference`: [`mean_spectrum`] of what they stand against
+    /// - `reference`: [`mean_spectrum`] of the windows they are compared with
     #[must_use]
     pub fn of(
         kind: &'static str,
@@ -60,7 +60,7 @@ impl SeaRow {
     }
 }
 
-/// Power by rings of windows of [`WINDOW`] rows and columns and of variance 1, up to the Nyquist wavenumber, mean over the windows
+/// Mean radial power spectrum of windows of [`WINDOW`] rows and columns, scaled to variance 1, up to the Nyquist wavenumber
 /// \[dB\].
 #[must_use]
 pub fn mean_spectrum(windows: &[Field]) -> Vec<f64> {
@@ -84,8 +84,8 @@ mod tests {
     use super::*;
     use wake_nn::noise::NoiseSource;
 
-    /// White noise of any scale has the spectrum of white noise, 1/(128² − 1) in every ring; its seed moves a mean over four windows
-    /// by less than 3 dB where a ring has eight waves.
+    /// White noise of any scale has a power of 1/(128² − 1) in every ring; the scatter of a mean over four windows is below 3 dB
+    /// where a ring has eight waves.
     #[test]
     fn the_spectrum_knows_no_scale() {
         let noise = |seed: u64, scale: f32| {

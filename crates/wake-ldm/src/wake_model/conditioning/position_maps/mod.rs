@@ -1,4 +1,4 @@
-//! Where the pixels of the latents lie in the ship's frame.
+//! Positions of the latent pixels in the ship's frame.
 
 use super::features::TOLD_SPACING;
 use wake_physics::Scene;
@@ -7,11 +7,11 @@ use wake_physics::scene::{Grid, Ship};
 
 /// Side of the squares of pixels that become one latent pixel.
 pub const PATCH_SIZE: usize = 8;
-/// Maps at the size of the latents.
+/// Number of maps, which have the size of the latents.
 pub const PLACES: usize = 8;
-/// Which of them says whether a place is in the wedge.
+/// Index of the map that says whether a position is in the wedge.
 pub const WEDGE: usize = 5;
-/// Half-width of the band behind the stern \[m\], on pixels of 4 m as all lengths here.
+/// Half-width of the band behind the stern \[m\], for pixels of 4 m like all lengths here.
 const BAND: f64 = 40.0;
 
 /// Size of an image in pixels, and of a pixel.
@@ -23,24 +23,25 @@ pub struct MapGrid {
     pub spacing: f64,
 }
 
-/// The ship's own axes.
+/// Axes of the ship.
 struct Frame {
     forward: [f64; 2],
     position: [f64; 2],
     /// From midship to bow or stern \[m\].
     half_length: f64,
-    /// How far the wedge reaches astern where it is 1 m wide on one side \[m\].
+    /// Distance astern at which the wedge is 1 m wide on one side \[m\].
     slope: f64,
-    /// Divisor of lengths: pixels count as if they had 4 m.
+    /// Divisor of lengths, which scales pixels to 4 m.
     scale: f64,
 }
 
-/// Places of latent pixels in the frame of the ship in whose wedge they lie deepest; all zero where no ship moves.
+/// Position maps of latent pixels, each in the frame of the ship in whose wedge it lies deepest; zero without a moving ship.
 ///
-/// Distances along and across the track, in the image's axes and from the ship, in the wedge of the bow's waves or not, how
-/// far from its edge, and a band behind the stern. The wedge opens as the wake does at this speed and depth.
+/// The maps hold distances along and across the track, in the image's axes and from the ship, whether a pixel is in the wedge
+/// of the bow's waves, its distance from the edge, and a band behind the stern. The wedge opens as the wake does at this speed
+/// and depth.
 ///
-/// `cells`: squares of [`PATCH_SIZE`] × [`PATCH_SIZE`] pixels, counted in rows.
+/// - `cells`: squares of [`PATCH_SIZE`] × [`PATCH_SIZE`] pixels, numbered row by row
 ///
 /// # Shapes
 ///
@@ -71,7 +72,7 @@ pub fn places(scene: &Scene, cells: &[usize]) -> Vec<f32> {
 }
 
 impl MapGrid {
-    /// The pixels of a scene, which are as many in rows as in columns.
+    /// Grid of a scene, which must have as many rows as columns.
     pub fn of(grid: &Grid) -> Self {
         Self {
             size: grid.rows,
@@ -79,13 +80,13 @@ impl MapGrid {
         }
     }
 
-    /// All squares of pixels, in rows.
+    /// Indices of all squares of pixels, row by row.
     pub fn cells(self) -> Vec<usize> {
         let coarse = self.size / PATCH_SIZE;
         (0..coarse * coarse).collect()
     }
 
-    /// Place (x, y) \[m\] of the middle of a square, half a pixel before its pixel `PATCH_SIZE`/2.
+    /// Centre (x, y) \[m\] of a square, half a pixel before its pixel `PATCH_SIZE`/2.
     fn middle(self, cell: usize) -> [f64; 2] {
         let coarse = self.size / PATCH_SIZE;
         let [row, column] = [cell / coarse, cell % coarse].map(|n| (n * PATCH_SIZE) as f64);
@@ -98,7 +99,7 @@ impl MapGrid {
 }
 
 impl Frame {
-    /// The frame of a ship that moves.
+    /// Frame of a ship, if it moves.
     fn of(ship: &Ship, scene: &Scene) -> Option<Self> {
         let (sin, cos) = ship.heading.to_radians().sin_cos();
         (ship.speed > 0.0).then(|| Self {
@@ -110,19 +111,19 @@ impl Frame {
         })
     }
 
-    /// (ξ, η) \[m\]: forward of midship and to port.
+    /// Position (ξ, η) \[m\]: forward of midship and to port.
     fn seen_from_ship(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let (dx, dy) = (x - self.position[0], y - self.position[1]);
         let [fx, fy] = self.forward;
         [dx * fx + dy * fy, dy * fx - dx * fy]
     }
 
-    /// How far forward of the wedge's edge a place lies \[m\]: negative inside.
+    /// Distance of a position forward of the wedge's edge \[m\]; negative inside.
     fn outside(&self, [along, across]: [f64; 2]) -> f64 {
         self.slope * across.abs() + along - self.half_length
     }
 
-    /// What the maps show of a place.
+    /// Values of the maps at a position.
     fn places(&self, place: [f64; 2]) -> [f64; PLACES] {
         let [fx, fy] = self.forward;
         let inside = self.outside(place) < 0.0 && place[0] < 0.0;

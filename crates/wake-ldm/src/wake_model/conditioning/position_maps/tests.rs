@@ -8,7 +8,7 @@ const GRID: MapGrid = MapGrid {
     spacing: 4.0,
 };
 
-/// The ship of the paper's grid.
+/// Length of the ship in the paper's grid.
 const SHIP_LENGTH: f64 = 195.0;
 
 fn known(speed: f64, heading: f64, position: [f64; 2]) -> Scene {
@@ -36,7 +36,7 @@ fn no_track_no_maps() {
     }
 }
 
-/// Twice the distances on pixels of twice the side are the same maps; each wedge has the frame of its own ship.
+/// Doubling all distances and the side of a pixel leaves the maps unchanged; each wedge uses the frame of its own ship.
 #[test]
 fn maps_count_pixels_and_know_every_ship() {
     let near = known(9.0, 70.0, [40.0, -30.0]);
@@ -77,7 +77,7 @@ fn maps_count_pixels_and_know_every_ship() {
 
 #[test]
 fn maps_are_bounded_and_move_with_the_ship() {
-    // Three latent pixels to the right in range and two toward smaller azimuth, so down.
+    // Three latent pixels to the right in range, and two toward smaller azimuth, which is down.
     let shift = [3.0, -2.0].map(|n| n * PATCH_SIZE as f64 * GRID.spacing);
     let coarse = GRID.size / PATCH_SIZE;
     let [a, b] =
@@ -112,7 +112,7 @@ fn the_wedge_is_that_of_the_simulators_measurements() {
                 .map(|p| (row + p / PATCH_SIZE, column + p % PATCH_SIZE));
             let count = pixels.filter(|(i, j)| inside[i * GRID.size + j]).count();
             let ours = maps[WEDGE * coarse * coarse + cell] > 0.5;
-            // The map says where the middle of a square lies.
+            // The map is evaluated at the centre of a square.
             if count == 0 || count == PATCH_SIZE * PATCH_SIZE {
                 assert_eq!(ours, count > 0, "heading {heading}, square {cell}");
             }
@@ -120,7 +120,7 @@ fn the_wedge_is_that_of_the_simulators_measurements() {
     }
 }
 
-/// The bow of a short ship lies nearer, and the wedge begins there.
+/// The bow of a short ship is nearer to midship, and the wedge begins there.
 #[test]
 fn the_wedge_begins_at_the_bow_of_the_ship() {
     let middle = |length: f64| {
@@ -128,7 +128,7 @@ fn the_wedge_begins_at_the_bow_of_the_ship() {
         short.ships[0].length = length;
         let frame = Frame::of(&short.ships[0], &short).unwrap();
         let edge = |across: f64, astern: f64| frame.places([-astern, across])[WEDGE];
-        // On the edge of the wedge |η| = tan(ψ)(L/2 − ξ), a little inside and outside.
+        // On the edge of the wedge |η| = tan(ψ)(L/2 − ξ), slightly inside and outside.
         let at = |astern: f64| (astern + 0.5 * length) / 8f64.sqrt();
         (edge(0.99 * at(300.0), 300.0), edge(1.01 * at(300.0), 300.0))
     };

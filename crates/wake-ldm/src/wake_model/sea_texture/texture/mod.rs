@@ -1,4 +1,4 @@
-//! A learnt sea: its flow, the styles it was learnt in, and what it draws.
+//! A learnt sea: its flow, the styles from which it was learnt, and sampling.
 
 use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
@@ -16,23 +16,23 @@ use wake_nn::noise::NoiseSource;
 use wake_nn::weights::files::WeightFiles;
 use wake_nn::weights::{Layout, Precision, load, save_noted};
 
-/// Styles of a learnt sea.
+/// Number of styles of a learnt sea.
 const STYLES: usize = 64;
-/// Steps from noise to amplitude.
+/// Number of steps from noise to amplitude.
 const STEPS: usize = 4;
-/// Pixels around an image that are drawn and cut off, for the network sees zeros beyond them.
+/// Margin in pixels that is sampled around an image and cut off, because the network sees zeros beyond it.
 const MARGIN: usize = 32;
-/// Memory that a pixel takes while it is drawn \[bytes\]: the network's widest layers, noise and its transform, rounded up.
+/// Memory per pixel during sampling \[bytes\]: the network's widest layers, the noise and its transform, rounded up.
 const BYTES_OF_A_PIXEL: u64 = 400;
-/// Largest ratio of the pixels of a scene to those that were learnt: chosen.
+/// Largest ratio between the pixel size of a scene and that of the learnt sea (chosen).
 const LARGEST_RATIO: f64 = 1.25;
-/// The header's entry with the side of a pixel.
+/// Header entry with the side of a pixel.
 const SPACING: &str = "spacing";
 
-/// A sea that was learnt from images: draws amplitude with the speckle of their sensors.
+/// Sea learnt from images, which samples amplitude with the speckle of their sensors.
 ///
-/// What is drawn has the style of one of the patches that it was learnt from, taken by the image's seed. Amplitude is what
-/// the images show, linear in grey from black on: where black was no amplitude of 0 it is off by that.
+/// Each image has the style of one of the training patches, selected by the image's seed. Amplitude is proportional to the
+/// grey of the images; if their black was not an amplitude of 0, it is off by that offset.
 #[derive(Debug, Clone)]
 pub struct SeaTexture {
     flow: SeaFlow,
@@ -40,7 +40,7 @@ pub struct SeaTexture {
     spacing: Option<f64>,
 }
 
-/// A learnt sea as it lies in a file.
+/// A learnt sea as stored in a file.
 #[derive(Module, Debug)]
 struct Stored {
     flow: SeaFlow,
@@ -51,13 +51,13 @@ struct Stored {
 }
 
 impl SeaTexture {
-    /// A sea of a flow and some styles, of which 64 are kept.
+    /// Makes a sea from a flow and some styles, of which 64 are kept.
     ///
-    /// - `spacing`: side of the pixels that were learnt \[m\], where it is known
+    /// - `spacing`: side of the training pixels \[m\], if known
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::InvalidOption`] for no style, [`wake_nn::Error::OutOfRange`] for a pixel below 0.1 or above 1000 m.
+    /// [`wake_nn::Error::InvalidOption`] without styles, [`wake_nn::Error::OutOfRange`] for a pixel below 0.1 or above 1000 m.
     pub fn new(flow: SeaFlow, styles: &[SeaStyle], spacing: Option<f64>) -> Result<Self> {
         if let Some(spacing) = spacing {
             check_range("spacing", spacing, 0.1, 1000.0)?;
@@ -71,7 +71,7 @@ impl SeaTexture {
         }
         #[cfg(feature = "autodiff")]
         let flow = flow.valid();
-        // Spread over all of them, and again from the first where they are fewer.
+        // Evenly selected from all styles, or repeated from the first if there are fewer.
         let at = |n: usize| match styles.len() {
             count if count < STYLES => n % count,
             count => n * count / STYLES,
@@ -87,8 +87,8 @@ impl SeaTexture {
     ///
     /// # Errors
     ///
-    /// As [`load`] for a file that is not there, broken or of another model; [`wake_nn::Error::InvalidOption`] with the
-    /// number for a style or a pixel that no sea has.
+    /// As [`load`] for a file that is missing, broken or from another model; [`wake_nn::Error::InvalidOption`] with the
+    /// value for a style or a pixel that is out of range.
     pub fn load(path: &Path, device: &Device) -> Result<Self> {
         let empty = Stored {
             flow: SeaFlow::new(device),
@@ -125,7 +125,7 @@ impl SeaTexture {
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::Io`] when it cannot be written.
+    /// [`wake_nn::Error::Io`] when the file cannot be written.
     pub fn save(&self, path: &Path) -> Result<()> {
         let device = self.flow.devices().into_iter().next().unwrap_or_default();
         let numbers: Vec<f32> = self.styles.iter().flat_map(|s| *s.numbers()).collect();
@@ -150,21 +150,21 @@ impl SeaTexture {
         )?)
     }
 
-    /// Side of the pixels that were learnt \[m\], where it is known.
+    /// Side of the training pixels \[m\], if known.
     pub fn spacing(&self) -> Option<f64> {
         self.spacing
     }
 
-    /// The styles that are drawn.
+    /// Styles from which images are sampled.
     pub fn styles(&self) -> &[SeaStyle] {
         &self.styles
     }
 
-    /// Checks that pixels are those that were learnt, to a quarter; any, where those are not known.
+    /// Checks that a pixel size is within a quarter of that of the training images; if theirs is unknown, any size passes.
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::InvalidOption`] for others.
+    /// [`wake_nn::Error::InvalidOption`] for another size.
     pub fn check_spacing(&self, spacing: f64) -> Result<()> {
         match self.spacing {
             Some(learnt) if (spacing / learnt).max(learnt / spacing) > LARGEST_RATIO => {
@@ -181,14 +181,15 @@ impl SeaTexture {
         }
     }
 
-    /// A sea: intensity of mean 1 with its speckle, of the style that the seed takes.
+    /// Samples a sea: intensity of mean 1 with its speckle, in the style selected by the seed.
     ///
-    /// Opposite edges are independent. Of one seed, images of other sizes are other seas.
+    /// Opposite edges are independent. With the same seed, images of different sizes have different seas.
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::OutOfRange`] for no rows or columns, [`wake_nn::Error::InvalidOption`] for an image that does not fit in memory,
-    /// [`wake_nn::Error::NotFinite`] for weights whose numbers overflow.
+    /// [`wake_nn::Error::OutOfRange`] without rows or columns, [`wake_nn::Error::InvalidOption`] for an image that does
+    /// not fit in
+    /// memory, [`wake_nn::Error::NotFinite`] for weights whose numbers overflow.
     pub fn sample(&self, seed: u64, rows: usize, columns: usize) -> Result<Field> {
         let draw = NoiseSource::new(seed).uniform(streams::STYLES, 0);
         let style = &self.styles[(draw * STYLES as f64) as usize];
@@ -202,7 +203,7 @@ impl SeaTexture {
         Ok(sea)
     }
 
-    /// Amplitudes of a sea of a style, over their median.
+    /// Samples amplitudes of a sea in a style, divided by their median.
     ///
     /// # Errors
     ///
@@ -234,7 +235,7 @@ impl SeaTexture {
         let (mean, spread) = (style.mean(), style.spread());
         let amplitude = |x: f32| (mean + spread * x).max(0.0);
         let values: Vec<f32> = x.iter::<f32>().map(amplitude).collect();
-        // The larger of 0 and no number is 0: the noise itself is looked at.
+        // The maximum of 0 and NaN is 0, so the numbers themselves are checked.
         match x.iter::<f32>().all(f32::is_finite) {
             true => Ok(Field {
                 rows,
@@ -247,21 +248,21 @@ impl SeaTexture {
         }
     }
 
-    /// The image of a scene on this sea, intensity in the unit of σ⁰.
+    /// Image of a scene on this sea, as intensity in the unit of σ⁰.
     ///
     /// ```text
     /// I = E s + echo
     /// ```
     ///
-    /// - E: the image that is expected of the scene over all seas, wakes and noise in it, echoes not
-    /// - s: a sea of mean 1 with its speckle, [`sample`](Self::sample) of the scene's seed
-    /// - echo: the bright points of the ships that the scene's seed draws; they have no speckle
+    /// - E: the expected image of the scene over all seas, with wakes and noise, without echoes
+    /// - s: a sea of mean 1 with its speckle, [`sample`](Self::sample) with the scene's seed
+    /// - echo: the bright points of the ships, random by the scene's seed; they have no speckle
     ///
-    /// The sea takes no notice of the wake: where the wake doubles the intensity it doubles sea and speckle.
+    /// The sea does not depend on the wake: where the wake doubles the intensity, it doubles sea and speckle.
     ///
     /// # Errors
     ///
-    /// As [`check_spacing`](Self::check_spacing) and [`sample`](Self::sample), [`Error::Scene`] for a scene that is not valid
+    /// As [`check_spacing`](Self::check_spacing) and [`sample`](Self::sample); [`Error::Scene`] for a scene that is invalid
     /// or does not fit in memory.
     pub fn image(&self, scene: &Scene) -> Result<Field> {
         self.check_spacing(scene.grid.spacing)?;
@@ -284,7 +285,7 @@ impl SeaTexture {
     }
 }
 
-/// Whether an image has pixels, and fits into memory while it is drawn.
+/// Checks that an image has pixels, and fits into memory during sampling.
 fn check_size(rows: usize, columns: usize) -> Result<()> {
     check_range("rows", rows as f64, 1.0, 65536.0)?;
     check_range("columns", columns as f64, 1.0, 65536.0)?;

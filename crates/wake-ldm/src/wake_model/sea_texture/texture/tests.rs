@@ -1,4 +1,4 @@
-//! What a learnt sea draws, and what of its files is refused.
+//! Sampling of a learnt sea, and rejection of bad files.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
@@ -8,7 +8,7 @@ use half::f16;
 use super::super::WINDOW;
 use super::*;
 
-/// Amplitudes 100 + 20 n of noise that neighbours in a row share half of.
+/// Amplitudes 100 + 20 n, with noise n of which neighbours in a row share half.
 fn patch(seed: u64) -> Field {
     let white = NoiseSource::new(seed).normal(0, WINDOW * WINDOW + 1);
     let value = |n: usize| 100.0 + 20.0 * (white[n] + white[n + 1]) / f32::sqrt(2.0);
@@ -29,7 +29,7 @@ fn texture() -> SeaTexture {
     SeaTexture::new(SeaFlow::new(&Device::flex()), &styles(3), Some(10.0)).unwrap()
 }
 
-/// All weights zero: the flow stands still.
+/// Sets all weights to zero, which makes the velocity zero.
 struct Still;
 
 impl ModuleMapper for Still {
@@ -50,7 +50,7 @@ fn distance(a: &Field, b: &Field) -> f32 {
     pairs.fold(0.0, |most, (a, b)| most.max((a - b).abs()))
 }
 
-/// Of a flow that stands still the sea is the noise that it starts from, without its margin.
+/// With zero velocity, the sea is its initial noise without the margin.
 #[test]
 fn without_a_flow_the_sea_is_gaussian_noise_of_its_style() {
     let (sea, style) = (still(), &styles(1)[0]);
@@ -80,7 +80,7 @@ fn a_seed_is_one_sea_of_mean_1() {
     );
 }
 
-/// Every one of a few styles is drawn, and of many the kept ones are spread over all.
+/// If there are few styles, all are kept; if there are many, the kept ones are spread over all.
 #[test]
 fn styles_are_kept_from_first_to_last() {
     let sea = texture();
@@ -100,7 +100,7 @@ fn styles_are_kept_from_first_to_last() {
     assert!(none.unwrap_err().to_string().contains("at least one patch"));
 }
 
-/// Weights and styles are rounded to 16 bits, 2⁻¹¹ each; a sea of 12 convolutions in 4 steps moves by some hundred of them.
+/// Weights and styles are rounded to 16 bits, 2⁻¹¹ each; over 12 convolutions in 4 steps, a sea changes by some hundred of these.
 #[test]
 fn a_file_holds_all_of_a_sea() {
     let folder = tempfile::tempdir().unwrap();
@@ -123,7 +123,7 @@ fn a_file_holds_all_of_a_sea() {
     );
 }
 
-/// Numbers of 16 bits before and after, at a place of a tensor of a file.
+/// Overwrites one 16-bit number of a tensor in a file.
 fn with_number(path: &Path, tensor: &str, at: usize, value: f32) {
     let mut bytes = std::fs::read(path).unwrap();
     let header = u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
@@ -178,7 +178,7 @@ fn files_that_hold_no_sea_are_refused_in_one_sentence() {
                 &Device::flex(),
             )),
         };
-        // The styles of a good file, below another header.
+        // The styles of a good file, with another header.
         texture().save(&path).unwrap();
         let good = load(stored, Layout::Diffusers, &path).unwrap();
         save_noted(
@@ -212,7 +212,7 @@ impl ModuleMapper for Poison {
     }
 }
 
-/// A ship with its dark line and its echo on a sea of pixels of 10 m.
+/// A ship with its dark wake and its echo, on a sea of pixels of 10 m.
 fn scene() -> Scene {
     let changes = [
         "grid.rows=128",
@@ -224,8 +224,8 @@ fn scene() -> Scene {
     Scene::default().with_assignments(&changes).unwrap()
 }
 
-/// Over many seeds the sea is 1 in the wake as elsewhere. Neighbours in a row share half of their noise: a mean over n
-/// intensities of spread s is known to s √(2/n), here over the darkest tenth of the expected image.
+/// Averaged over many seeds, the sea is 1 in the wake as elsewhere. Neighbours in a row share half of their noise: a mean over n
+/// intensities of spread s has a standard error of s √(2/n), here over the darkest tenth of the expected image.
 #[test]
 fn the_image_is_the_expected_one_times_the_sea_and_the_echo_on_it() {
     let (sea, scene) = (still(), scene());
@@ -259,7 +259,7 @@ fn the_image_is_the_expected_one_times_the_sea_and_the_echo_on_it() {
     }
     let error = 5.0 * spread * (2.0 / (seeds as f64 * dark.len() as f64)).sqrt();
     assert!((ratio - 1.0).abs() < error, "{ratio} {error}");
-    // There is a wake to be seen, and a ship.
+    // The scene has a visible wake, and a ship.
     let open = f64::from(expected.values[order[order.len() / 2]]);
     let darkest = dark
         .iter()

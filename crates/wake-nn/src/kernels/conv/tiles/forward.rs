@@ -1,4 +1,4 @@
-//! The convolution itself by tiles.
+//! Forward convolution by tiles.
 
 use pulp::{Simd, WithSimd};
 
@@ -12,10 +12,10 @@ use crate::kernels::conv::geometry::Geometry;
 use crate::kernels::conv::layout::{Gather, Layout};
 use crate::kernels::tile::{self, ROWS};
 
-/// Numbers of the transformed image that a task keeps in a core's second cache: 512 KiB.
+/// Numbers of the transformed image that a task keeps in a core's L2 cache: 512 KiB.
 const NEAR: usize = 128 * 1024;
 
-/// Convolves a batch of images by tiles, with shapes as of [`convolve`](crate::kernels::conv::convolve).
+/// Convolves a batch of images by tiles, with the shapes of [`convolve`](crate::kernels::conv::convolve).
 pub(in crate::kernels::conv) fn convolve(
     x: &[f32],
     weight: &[f32],
@@ -56,8 +56,8 @@ pub(in crate::kernels::conv) fn convolve(
     y
 }
 
-/// Images and rows of tiles that are one task: a full panel at least, and as many more as stay near and leave every core its share.
-/// Several images are whole.
+/// Images and rows of tiles per task: at least a full panel, and more if they fit in the cache and every core gets a share
+/// of the work. Several images are taken whole.
 fn task(tiles: &Geometry, width: usize) -> (usize, usize) {
     let [rows, columns] = tiles.size_out();
     let near = NEAR / (PLACES * tiles.channels[0]) / columns;
@@ -71,7 +71,7 @@ fn task(tiles: &Geometry, width: usize) -> (usize, usize) {
     }
 }
 
-/// The kernels `G w Gᵀ`: `[place, channels out, channels in]`.
+/// Transformed kernels `G w Gᵀ`: `[place, channels out, channels in]`.
 fn transformed(weight: &[f32], geometry: &Geometry) -> Vec<f32> {
     let [channels_in, channels_out] = geometry.channels;
     let mut out = vec![0.0; PLACES * channels_out * channels_in];
@@ -125,7 +125,7 @@ fn transformed_kernels(w: &[[f32; LANES]; 9]) -> [[f32; LANES]; PLACES] {
     out
 }
 
-/// Some rows of tiles of all channels of one image, or of some images all rows.
+/// Some rows of tiles of all channels of one image, or all rows of some images.
 struct Block<'a> {
     planes: &'a [f32],
     /// `[place, channels out, channels in]`.
@@ -137,7 +137,7 @@ struct Block<'a> {
     y: Vec<&'a mut [f32]>,
     /// Pixels of a row.
     columns: usize,
-    /// Of these images.
+    /// Windows of these images.
     tiles: Geometry,
     layout: Layout,
 }
@@ -205,13 +205,13 @@ fn transform_window<S: Simd>(simd: S, window: &[f32], channel: usize, panel: &mu
 }
 
 impl Block<'_> {
-    /// The sixteen products of kernels and windows, from the `first` panel on, and the pixels that follow.
+    /// Multiplies kernels and windows at all sixteen places, from the `first` panel on, and writes the resulting pixels.
     #[inline(always)]
     fn multiply<S: Simd>(&mut self, simd: S, image: &[f32], first: usize) {
         let width = tile::width::<S>();
         let [channels, channels_out] = self.tiles.channels;
         let panel = PLACES * channels * width;
-        // Of every panel: `[row, place, window]`.
+        // For every panel: `[row, place, window]`.
         let mut products = vec![0.0; image.len() / panel * ROWS * PLACES * width];
         for row in (0..channels_out).step_by(ROWS) {
             for place in 0..PLACES {
@@ -247,25 +247,25 @@ impl Block<'_> {
     }
 }
 
-/// Where the tiles of a panel lie.
+/// Position of a panel's tiles.
 struct Run {
-    /// The panel's first tile, counted from the block's.
+    /// First tile of the panel, counted from the block's first.
     first: usize,
     /// Pixels of a row.
     columns: usize,
-    /// From the plane of one image to that of the next.
+    /// Number of planes from one image to the next.
     images: usize,
 }
 
 impl Run {
-    /// Writes `Aᵀ m A` of the products `[place, tile]` and a bias to their pixels, of which the first plane is that of the first
+    /// Writes `Aᵀ m A` of the products `[place, tile]` plus a bias to their pixels; the first of `planes` belongs to the first
     /// image.
     #[inline(always)]
     fn write<S: Simd>(&self, simd: S, products: &[f32], bias: f32, planes: &mut [&mut [f32]]) {
         let width = tile::width::<S>();
         let (m, _) = S::as_simd_f32s(products);
         let bias = simd.splat_f32s(bias);
-        // By row and column in the tile, and half of the panel.
+        // By row and column in the tile, and by half of the panel.
         let mut pixels = [[[bias; 2]; 2]; 2];
         for half in 0..2 {
             let mut columns = [[bias; 2]; 4];
@@ -312,7 +312,7 @@ impl Run {
     }
 }
 
-/// Writes the even and the odd pixels of a row, which may end with an even one.
+/// Interleaves the even and odd pixels of a row, which may end with an even one.
 #[inline(always)]
 fn alternate(even: &[f32], odd: &[f32], row: &mut [f32]) {
     let (pairs, last) = row.as_chunks_mut::<2>();

@@ -1,5 +1,5 @@
-//! Convolutions with kernels of 3 × 3 by tiles of 2 × 2 pixels, with four products a pixel instead of nine, and their gradients
-//! to the weights by the same places.
+//! Convolutions with 3 × 3 kernels by tiles of 2 × 2 pixels, with four products per pixel instead of nine, and their
+//! gradients with respect to the weights by the same transforms.
 //!
 //! ```text
 //! y  = Aᵀ [ (G w Gᵀ) ⊙ (Bᵀ d B) ] A
@@ -11,9 +11,9 @@
 //!      ⎣0  1  0 −1⎦       ⎣ 0   0   1⎦
 //! ```
 //!
-//! - `d`: the 4 × 4 pixels that a tile sees, `w`: a kernel, `dy`: the gradient of a tile's pixels
-//! - `⊙`: number by number; summed over the channels for `y` and over the tiles for `dw`, a matrix product for each of the
-//!   sixteen places
+//! - `d`: the 4 × 4 pixels that a tile reads; `w`: a kernel; `dy`: the gradient of a tile's pixels
+//! - `⊙`: element by element, summed over the channels for `y` and over the tiles for `dw`: a matrix product for each of
+//!   the sixteen places
 //!
 //! The gradient is the transpose of the convolution, as a linear map of the kernel.
 //!
@@ -41,24 +41,24 @@ const PLACES: usize = 16;
 /// Kernels that are transformed side by side.
 const LANES: usize = 16;
 
-/// Most numbers of transformed kernels, which all tasks read: 20 MiB, a share of the cores' last cache.
+/// Largest count of numbers in the transformed kernels, which all tasks read: 20 MiB, a part of the last-level cache.
 const FAR: usize = 5 * 1024 * 1024;
 
-/// Below so many channels transforms cost more than they save.
+/// Below this many channels, the transforms cost more than they save.
 const FEW: usize = 16;
 
-/// Below so many channels tiles do not pay for gradients to weights, where both factors of every product are transformed.
+/// Below this many channels, tiles do not pay for weight gradients, where both factors of every product are transformed.
 const FEW_FOR_WEIGHTS: usize = 96;
 
-/// Products that take as long as the transform of one kernel, memory included, in tiles that are as wide as [`WIDE`]; fewer where
-/// products take longer, in narrower ones.
+/// Products that take as long as the transform of one kernel, memory access included, with tiles as wide as [`WIDE`];
+/// fewer with narrower tiles, where products take longer.
 const TRANSFORM: usize = 1500;
 
-/// Width of a tile of AVX-512.
+/// Tile width with AVX-512.
 const WIDE: usize = 32;
 
-/// Whether tiles need at most two thirds of the products, transforms of kernels and unfilled vectors counted, and kernels stay
-/// near.
+/// Whether tiles need at most two thirds of the products, counting transforms of kernels and unfilled vectors, and the
+/// kernels fit in the cache.
 pub(super) fn win(geometry: &Geometry) -> bool {
     let width = arch().dispatch(tile::Width);
     let [channels_in, channels_out] = geometry.channels;
@@ -72,13 +72,13 @@ pub(super) fn win(geometry: &Geometry) -> bool {
         && 3 * (tiles + transform) <= 2 * 9 * geometry.batch * rows * columns
 }
 
-/// The same for gradients to weights.
+/// As `win`, for gradients with respect to the weights.
 pub(super) fn win_for_weights(geometry: &Geometry) -> bool {
     let [channels_in, channels_out] = geometry.channels;
     channels_in.min(channels_out) >= FEW_FOR_WEIGHTS && win(geometry)
 }
 
-/// The windows that tiles see: 4 × 4 pixels, two apart.
+/// Windows that tiles read: 4 × 4 pixels, two apart.
 fn tiles_of(geometry: &Geometry) -> Geometry {
     let [rows, columns] = geometry.size_out();
     let [top, left, bottom, right] = geometry.border;

@@ -1,4 +1,4 @@
-//! The gradient to the weights by tiles.
+//! Gradient with respect to the weights by tiles.
 
 use pulp::{Simd, WithSimd};
 
@@ -10,13 +10,13 @@ use crate::kernels::conv::geometry::Geometry;
 use crate::kernels::conv::weights::interleave;
 use crate::kernels::tile::{self, ROWS};
 
-/// Numbers of transformed windows and gradients that a task keeps in a core's second cache: 384 KiB.
+/// Numbers of transformed windows and gradients that a task keeps in a core's L2 cache: 384 KiB.
 const NEAR: usize = 96 * 1024;
 
-/// Places of one row of a transformed tile, which are one task.
+/// Places in one row of a transformed tile, which is one task.
 const ROW: usize = 4;
 
-/// Gradient to the weights by tiles, with shapes as of [`weight_gradient`](crate::kernels::conv::weight_gradient).
+/// Gradient with respect to the weights, with the shapes of [`weight_gradient`](crate::kernels::conv::weight_gradient).
 pub(in crate::kernels::conv) fn weight_gradient(
     x: &[f32],
     dy: &[f32],
@@ -31,7 +31,7 @@ pub(in crate::kernels::conv) fn weight_gradient(
     let border = [0, 0, rows % 2, columns % 2];
     let dy = &interleave(dy, channels_out, [rows, columns], border, width);
     let tiles = channels_in.div_ceil(width);
-    // Of every tile of channels in and row of places: `[place, channel out, channel in]`.
+    // For every tile of input channels and row of places: `[place, channel out, channel in]`.
     let gradients: Vec<_> = (0..tiles * ROW)
         .into_par_iter()
         .map(|task| {
@@ -56,7 +56,7 @@ pub(in crate::kernels::conv) fn weight_gradient(
     out
 }
 
-/// The gradients at one row of places, for one tile of channels in.
+/// Gradients at one row of places, for one tile of input channels.
 struct Share<'a> {
     /// The image and the output's gradient: `[image, tile of channels, pixel, channel]`.
     x: &'a [f32],
@@ -109,14 +109,14 @@ impl WithSimd for Share<'_> {
 }
 
 impl Share<'_> {
-    /// Image, and row and column of its tiles, of a window.
+    /// Image, row and column of a window.
     fn place(&self, window: usize) -> (usize, usize, usize) {
         let [rows, columns] = self.windows.size_out();
         let (image, window) = (window / (rows * columns), window % (rows * columns));
         (image, window / columns, window % columns)
     }
 
-    /// A row of `Bᵀ d B` of one window, all channels of the tile; its places `step` apart.
+    /// Writes one row of `Bᵀ d B` of a window for all channels of the tile, with places `step` apart.
     #[inline(always)]
     fn transform_window<S: Simd>(&self, simd: S, window: usize, out: &mut [f32], step: usize) {
         let width = tile::width::<S>();
@@ -126,7 +126,7 @@ impl Share<'_> {
         let [rows, columns] = [top + rows + bottom, left + columns + right];
         let tiles = self.windows.channels[0].div_ceil(width);
         let plane = (image * tiles + self.tile) * rows * columns;
-        // Bᵀ has two numbers in a row: 1, −1 or 1, 1.
+        // Each row of Bᵀ has two numbers that are not zero: 1, −1 or 1, 1.
         let (a, b) = [(0, 2), (1, 2), (2, 1), (1, 3)][self.row];
         let a = &self.x[(plane + (2 * row + a) * columns + 2 * column) * width..][..4 * width];
         let b = &self.x[(plane + (2 * row + b) * columns + 2 * column) * width..][..4 * width];
@@ -151,7 +151,7 @@ impl Share<'_> {
         }
     }
 
-    /// A row of `A dy Aᵀ` of one tile, all channels; its places `step` apart.
+    /// Writes one row of `A dy Aᵀ` of a tile for all channels, with places `step` apart.
     #[inline(always)]
     fn transform_gradient<S: Simd>(&self, simd: S, window: usize, out: &mut [f32], step: usize) {
         let width = tile::width::<S>();
@@ -192,7 +192,7 @@ impl Share<'_> {
     }
 }
 
-/// `Gᵀ u G` of the gradients `[row][column, channel out, channel in]` for one channel out: `[channel in, tap]`.
+/// Computes `Gᵀ u G` for one output channel as `[channel in, tap]`, from `[row][column, channel out, channel in]`.
 fn kernels(gradients: &[Vec<f32>], channel: usize, width: usize, out: &mut [f32]) {
     for (i, out) in out.chunks_mut(9 * LANES).enumerate() {
         let begin = i * LANES;
