@@ -18,15 +18,15 @@ use crate::window::sinc;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// Side of the windows in which a wake is searched \[pixels\] (chosen).
-const WINDOW: usize = 16;
+/// Side of the windows in which a wake is searched, in independent pixels (chosen). Pixels that an impulse response correlates
+/// make a window larger, so that visibility does not depend on how finely an image is sampled.
+const WINDOW: f64 = 16.0;
 
 /// Ratio from which a window shows the wake (chosen): root of the sum, over independent pixels, of the squared change by the
-/// wake, over the standard deviation of one pixel. Five standard deviations of a matched filter, about ⅓ of one in each pixel
-/// where all are independent.
+/// wake, over the standard deviation of one pixel. Five standard deviations of a matched filter, about ⅓ of one in each pixel.
 const THRESHOLD: f64 = 5.0;
 
-/// Rows of windows in which a part of a wake must be visible (chosen). A line of 16 pixels has no measurable direction.
+/// Rows of windows in which a part of a wake must be visible (chosen). A line of one row has no measurable direction.
 const LEAST_ROWS: usize = 2;
 
 /// Ratio of the resolution ρ of a Gaussian exp(−(πy/ρ)²) to its width at half power: π/(2√ln 2).
@@ -202,9 +202,14 @@ impl<'a> Background<'a> {
         self.transfer.at(k, omega).total().norm_sqr() * change * change
     }
 
+    /// Side of a window \[m\].
+    fn window(&self) -> f64 {
+        WINDOW * self.raster.spacing * self.correlated.sqrt()
+    }
+
     /// Visible extent of a wake that opens by `half_angle` \[rad\].
     pub(super) fn extent(&self, ship: usize, half_angle: f64) -> Extent {
-        let step = WINDOW as f64 * self.raster.spacing;
+        let step = self.window();
         let edge = self.effects.bright_edge.edges[ship];
         let band = self.dark_line(self.effects.turbulent.wakes[ship], edge);
         let wake = &self.models.wakes[ship];
@@ -241,8 +246,7 @@ impl<'a> Background<'a> {
             };
             let row = self.row(wake, distance, windows, rays, &dark);
             let end = distance + 0.5 * step + 2.0 * half_length;
-            let independent = WINDOW as f64 / self.correlated.sqrt();
-            let seen = |square: f64| independent * square.sqrt() >= THRESHOLD * self.noise;
+            let seen = |square: f64| WINDOW * square.sqrt() >= THRESHOLD * self.noise;
             if seen(row.largest[0]) {
                 seen_rows[0] += 1;
                 extent.waves = end;
@@ -323,7 +327,7 @@ impl<'a> Background<'a> {
         half_angle: f64,
         band: &DarkLine,
     ) -> Option<[f64; 2]> {
-        let width = WINDOW as f64 * self.raster.spacing;
+        let width = self.window();
         let half_length = 0.5 * wake.hull.length();
         let from_midship = distance + half_length;
         let reach = (half_angle.tan() * (from_midship + half_length)).min(self.diagonal());
@@ -344,7 +348,7 @@ impl<'a> Background<'a> {
         rays: &[ImagedRay],
         dark: &DarkNearby<'_>,
     ) -> Row {
-        let width = WINDOW as f64 * self.raster.spacing;
+        let width = self.window();
         let from_midship = distance + 0.5 * wake.hull.length();
         let half_band = dark.line.half_width(distance);
         let windows = (last - first) as usize + 1;
@@ -389,7 +393,7 @@ impl<'a> Background<'a> {
         let corners = there.straight().corners(&self.raster);
         let [astern, ahead] = span(corners.map(|corner| corner[0]));
         let [starboard, port] = span(corners.map(|corner| corner[1]));
-        let spare = 0.5 * WINDOW as f64 * self.raster.spacing;
+        let spare = 0.5 * self.window();
         (astern <= spare && ahead >= -spare).then_some([starboard - spare, port + spare])
     }
 

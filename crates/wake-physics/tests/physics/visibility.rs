@@ -340,3 +340,48 @@ fn a_faint_wake_ends_where_the_error_of_its_contrast_can_move_it() {
         }
     }
 }
+
+/// Pixels of 8, 4 and 2 m that sample one impulse response show the same wake: visible as far to half a window of 16 resolutions,
+/// which the borders of the image cut elsewhere, and with the same contrast and noise to the share of a window in its length. In a
+/// window of 16 of the finest pixels, which has two independent ones, the wake would not be visible.
+#[test]
+fn visibility_does_not_depend_on_how_finely_an_image_is_sampled() {
+    let of = |pixels: u32, spacing: u32| {
+        let scene = Scene::default()
+            .with_assignments(&[
+                &format!("grid.rows={pixels}"),
+                &format!("grid.columns={pixels}"),
+                &format!("grid.spacing={spacing}"),
+                "ship.heading=50",
+                "ship.position=[900, 800]",
+                "sea.wind_speed=9",
+                "radar.looks=4",
+                "radar.resolution=12",
+                "radar.range_resolution=12",
+                "model.terms=all",
+            ])
+            .unwrap();
+        let Visibility { contrast_db, snr } = visibility(&scene);
+        println!(
+            "{spacing} m: {:.0} m, {contrast_db:.3} dB, {snr:.3}",
+            length_m(&scene)
+        );
+        (length_m(&scene), contrast_db, snr)
+    };
+    let (length, contrast, snr) = of(300, 8);
+    let window = 16.0 * 12.0;
+    assert!(length > 2.0 * window, "{length}");
+    for (pixels, spacing) in [(600, 4), (1200, 2)] {
+        let finer = of(pixels, spacing);
+        assert!(
+            (finer.0 - length).abs() <= 0.5 * window,
+            "{length} {finer:?}"
+        );
+        let share = window / length;
+        assert!(
+            (finer.1 / contrast - 1.0).abs() < share,
+            "{contrast} {finer:?}"
+        );
+        assert!((finer.2 / snr - 1.0).abs() < share, "{snr} {finer:?}");
+    }
+}
