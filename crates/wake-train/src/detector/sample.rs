@@ -19,9 +19,9 @@ pub struct Sample {
     pub wakes: Vec<Wake>,
 }
 
-/// Width of a wake's line \[pixels\].
+/// Width of a wake's line, in independent pixels.
 const LINE: f64 = 16.0;
-/// Length \[pixels\] and signal-to-noise ratio assumed for a ship's wake without a label: between wakes that count and open
+/// Length, in independent pixels, and signal-to-noise ratio assumed for a ship's wake without a label: between wakes that count and open
 /// sea, so that it is ignored.
 const UNSURE: (f32, f32) = (80.0, 3.0);
 
@@ -96,7 +96,7 @@ pub(crate) fn wakes(objects: &[Object], scene: &Scene) -> Vec<Wake> {
                 (object.length_px - hull).max(LINE) as f32,
                 line_snr(object, scene),
             ),
-            None => UNSURE,
+            None => (UNSURE.0 * independent(scene) as f32, UNSURE.1),
         };
         wakes.push(Wake {
             tip: pixel(stern).map(|x| x as f32),
@@ -125,18 +125,23 @@ fn painted(object: &Object, scene: &Scene) -> Wake {
     }
 }
 
+/// Side of an independent pixel \[pixels\]: resolution over spacing, at least 1, geometric mean over both directions.
+fn independent(scene: &Scene) -> f64 {
+    let pixels = |resolution: f64| (resolution / scene.grid.spacing).max(1.0);
+    scene.radar.range_resolution.map_or(1.0, |range| {
+        (pixels(range) * pixels(scene.radar.azimuth_resolution)).sqrt()
+    })
+}
+
 /// Signal-to-noise ratio of the whole line, from that of a pixel.
 ///
 /// ```text
-/// snr √(length · width / correlated pixels),   correlated pixels = resolution over spacing, at least 1, in both directions
+/// snr √(length · width),   both in independent pixels
 /// ```
 fn line_snr(object: &Object, scene: &Scene) -> f32 {
-    let pixels = |resolution: f64| (resolution / scene.grid.spacing).max(1.0);
-    let correlated = scene.radar.range_resolution.map_or(1.0, |range| {
-        pixels(range) * pixels(scene.radar.azimuth_resolution)
-    });
+    let length = object.length_px / independent(scene);
     let snr = object.visibility.map_or(f64::INFINITY, |v| v.snr);
-    (snr * (object.length_px * LINE / correlated).sqrt()) as f32
+    (snr * (length * LINE).sqrt()) as f32
 }
 
 /// Signal-to-noise ratio of a pixel from that of the line, the inverse of [`line_snr`] for uncorrelated pixels.
@@ -212,8 +217,19 @@ mod tests {
         let mut correlated = scene.clone();
         correlated.radar.range_resolution = Some(40.0);
         correlated.radar.azimuth_resolution = 20.0;
-        // Eight pixels of ten metres count as one.
+        // Eight pixels of ten metres count as one: the line is √8 times shorter in independent pixels.
         let ratio = line_snr(&object, &scene) / line_snr(&object, &correlated);
-        assert!((ratio - 8f32.sqrt()).abs() < 1e-4, "{ratio}");
+        assert!((ratio - 8f32.powf(0.25)).abs() < 1e-4, "{ratio}");
+        // The same image with twice as many pixels has the same line.
+        let mut finer = correlated.clone();
+        finer.grid.spacing = 5.0;
+        let twice = Object {
+            length_px: 2.0 * object.length_px,
+            ..object
+        };
+        let ratio = line_snr(&twice, &finer) / line_snr(&object, &correlated);
+        assert!((ratio - 1.0).abs() < 1e-6, "{ratio}");
+        let longer = wakes(&[], &finer)[0].length / wakes(&[], &correlated)[0].length;
+        assert!((longer - 2.0).abs() < 1e-6, "{longer}");
     }
 }
