@@ -215,11 +215,9 @@ impl<'a> Background<'a> {
         let wake = &self.models.wakes[ship];
         let rays = self.rays(wake);
         let short = self.short_waves.as_ref().and_then(|short| short.of(ship));
-        let turns = wake.track.turn().is_some();
         let half_length = 0.5 * wake.hull.length();
         let mut extent = Extent::NOTHING;
-        let mut rows = Vec::new();
-        let mut seen_rows = [0; 2];
+        let (mut rows, mut seen_rows) = (Vec::new(), [0; 2]);
         for n in rows_in(&wake.track, &self.raster, half_length, step)
             .into_iter()
             .flatten()
@@ -233,7 +231,7 @@ impl<'a> Background<'a> {
                 .as_ref()
                 .map(|short| short.profile(wake, distance + half_length));
             // Behind a turning ship, waves and dark line lie as beside a straight track along the tangent.
-            let tangent = turns.then(|| {
+            let tangent = wake.track.turn().map(|_| {
                 let track = wake.track.at(-distance - half_length).straight();
                 let band = TurbulentWake { track, ..band.wake };
                 let rays = self.rays(&KelvinWake { track, ..*wake });
