@@ -13,7 +13,7 @@ use crate::image::GreyImage;
 use crate::maps::Maps;
 use crate::network::{INPUTS, Network, STRIDE};
 use crate::raster::Raster;
-use crate::search::{Mapper, Search, Tile, find, in_tile, merged};
+use crate::search::{LEAST_SCORE, Mapper, Search, Tile, find, in_tile, merged};
 use crate::self_check::{check_once, self_check};
 use crate::wake::Detection;
 
@@ -39,8 +39,6 @@ pub struct Detector {
 const NAME: &str = "detector.safetensors";
 const WEIGHTS: &[u8] = include_bytes!("../assets/detector.safetensors");
 const CALIBRATION: &str = include_str!("../assets/detector.calibration.json");
-/// Wakes with lower scores are not reported by default.
-const LEAST_SCORE: f32 = 0.03;
 /// Lowest score of a sure detection without a calibration.
 const UNCALIBRATED: f32 = 0.25;
 
@@ -164,7 +162,7 @@ impl Detector {
         Ok(self)
     }
 
-    /// Sets the lowest score of the reported wakes, 0 to 1, by default 0.03.
+    /// Sets the lowest score of the reported wakes, 0 to 1, by default [`LEAST_SCORE`].
     ///
     /// # Errors
     ///

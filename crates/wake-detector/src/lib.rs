@@ -37,5 +37,5 @@ pub use finder::{Finder, Radon};
 pub use image::GreyImage;
 pub use onnx::onnx;
 pub use raster::Raster;
-pub use search::Tile;
+pub use search::{LEAST_SCORE, Tile};
 pub use wake::{Detection, Extent, Wake, angle_of, direction};

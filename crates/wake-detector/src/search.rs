@@ -48,9 +48,10 @@ pub(crate) struct Search {
     pub(crate) least_score: f32,
 }
 
-/// Wakes with lower scores at a scale do not count, unless lower scores are to be reported. It does not rise with the least score,
-/// on which the scores of the other wakes would then depend.
-const LEAST_AT_A_SCALE: f32 = 0.03;
+/// Score below which detections are not reported by default.
+///
+/// At a single scale, no higher threshold is used: combined scores would depend on it.
+pub const LEAST_SCORE: f32 = 0.03;
 
 /// The wakes of an image in descending order of score; tips in pixels (column, row) from the centre of the first pixel.
 pub(crate) fn find<R: Raster>(
@@ -211,7 +212,7 @@ pub(crate) fn in_tile<R: Raster>(
         Some(metres) => view.around_candidates(native_of_spacing(metres), mapper),
         None => view.at_all_scales(mapper),
     };
-    let least = search.least_score.min(LEAST_AT_A_SCALE);
+    let least = search.least_score.min(LEAST_SCORE);
     let placed = |one: Detection| -> Option<Detection> {
         let counts = one.score >= least && missing.leaves(&one.wake);
         let wake = counts.then(|| tile.placed(one.wake)).flatten()?;

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use wake_detector::LEAST_SCORE;
+
 use crate::exit::Outcome;
 use crate::{locate, named};
 
@@ -75,7 +77,7 @@ pub(crate) struct ProductArguments {
 impl Arguments {
     /// Score below which detections of the network are left out.
     pub(super) fn least_score(&self) -> f32 {
-        self.least_score.unwrap_or(0.03)
+        self.least_score.unwrap_or(LEAST_SCORE)
     }
 
     /// Rejects options that would have no effect.
