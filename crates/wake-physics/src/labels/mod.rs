@@ -177,6 +177,16 @@ pub fn labels_of(scene: &Scene) -> Labels {
     labels(&Prepared::new(scene))
 }
 
+/// Side of an independent pixel of a scene's image \[pixels\]: the resolution of the impulse response over the pixel spacing, at
+/// least 1, as the geometric mean of both directions; 1 without an impulse response.
+#[must_use]
+pub fn independent_pixel(scene: &Scene) -> f64 {
+    let pixels = |resolution: f64| (resolution / scene.grid.spacing).max(1.0);
+    scene.radar.range_resolution.map_or(1.0, |range| {
+        (pixels(range) * pixels(scene.radar.azimuth_resolution)).sqrt()
+    })
+}
+
 /// Labels of a prepared scene; see [`labels_of`].
 pub(crate) fn labels(prepared: &Prepared<'_>) -> Labels {
     let (scene, models) = (prepared.scene, &prepared.models);

@@ -1,6 +1,7 @@
 //! Visible extent of a wake, and its expected contrast against sea and speckle, without an image.
 
 use super::dark_line::{DarkLine, DarkNearby};
+use super::independent_pixel;
 use super::rows::rows_in;
 use super::short_waves::ShortWaves;
 use crate::effects::Effects;
@@ -107,8 +108,8 @@ pub(super) struct Background<'a> {
     resolution: f64,
     /// Standard deviation of one pixel over its mean.
     noise: f64,
-    /// Number of pixels that count as one because the response correlates them, at least 1.
-    correlated: f64,
+    /// Side of the windows in which the wake is searched \[m\].
+    window: f64,
     waves_drawn: bool,
     dark_line_drawn: bool,
     edges_drawn: bool,
@@ -168,10 +169,7 @@ impl<'a> Background<'a> {
                 _ => 0.0,
             },
             noise: 0.0,
-            correlated: models.response.map_or(1.0, |response| {
-                let pixels = |resolution: f64| (resolution / models.pixels.image.spacing).max(1.0);
-                pixels(response.range.resolution) * pixels(response.azimuth.resolution)
-            }),
+            window: WINDOW * models.pixels.image.spacing * independent_pixel(scene),
             waves_drawn: drawn(Term::Kelvin),
             dark_line_drawn: drawn(Term::Turbulent),
             edges_drawn: drawn(Term::BrightEdge),
@@ -202,14 +200,9 @@ impl<'a> Background<'a> {
         self.transfer.at(k, omega).total().norm_sqr() * change * change
     }
 
-    /// Side of a window \[m\].
-    fn window(&self) -> f64 {
-        WINDOW * self.raster.spacing * self.correlated.sqrt()
-    }
-
     /// Visible extent of a wake that opens by `half_angle` \[rad\].
     pub(super) fn extent(&self, ship: usize, half_angle: f64) -> Extent {
-        let step = self.window();
+        let step = self.window;
         let edge = self.effects.bright_edge.edges[ship];
         let band = self.dark_line(self.effects.turbulent.wakes[ship], edge);
         let wake = &self.models.wakes[ship];
@@ -325,7 +318,7 @@ impl<'a> Background<'a> {
         half_angle: f64,
         band: &DarkLine,
     ) -> Option<[f64; 2]> {
-        let width = self.window();
+        let width = self.window;
         let half_length = 0.5 * wake.hull.length();
         let from_midship = distance + half_length;
         let reach = (half_angle.tan() * (from_midship + half_length)).min(self.diagonal());
@@ -346,7 +339,7 @@ impl<'a> Background<'a> {
         rays: &[ImagedRay],
         dark: &DarkNearby<'_>,
     ) -> Row {
-        let width = self.window();
+        let width = self.window;
         let from_midship = distance + 0.5 * wake.hull.length();
         let half_band = dark.line.half_width(distance);
         let windows = (last - first) as usize + 1;
@@ -391,7 +384,7 @@ impl<'a> Background<'a> {
         let corners = there.straight().corners(&self.raster);
         let [astern, ahead] = span(corners.map(|corner| corner[0]));
         let [starboard, port] = span(corners.map(|corner| corner[1]));
-        let spare = 0.5 * self.window();
+        let spare = 0.5 * self.window;
         (astern <= spare && ahead >= -spare).then_some([starboard - spare, port + spare])
     }
 

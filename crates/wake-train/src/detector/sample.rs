@@ -2,7 +2,7 @@
 
 use wake_dataset::Pair;
 use wake_physics::Scene;
-use wake_physics::labels::{Class, Object};
+use wake_physics::labels::{Class, Object, independent_pixel};
 
 use super::draw::Draw;
 use wake_detector::GreyImage;
@@ -96,7 +96,7 @@ pub(crate) fn wakes(objects: &[Object], scene: &Scene) -> Vec<Wake> {
                 (object.length_px - hull).max(LINE) as f32,
                 line_snr(object, scene),
             ),
-            None => (UNSURE.0 * independent(scene) as f32, UNSURE.1),
+            None => (UNSURE.0 * independent_pixel(scene) as f32, UNSURE.1),
         };
         wakes.push(Wake {
             tip: pixel(stern).map(|x| x as f32),
@@ -125,21 +125,13 @@ fn painted(object: &Object, scene: &Scene) -> Wake {
     }
 }
 
-/// Side of an independent pixel \[pixels\]: resolution over spacing, at least 1, geometric mean over both directions.
-fn independent(scene: &Scene) -> f64 {
-    let pixels = |resolution: f64| (resolution / scene.grid.spacing).max(1.0);
-    scene.radar.range_resolution.map_or(1.0, |range| {
-        (pixels(range) * pixels(scene.radar.azimuth_resolution)).sqrt()
-    })
-}
-
 /// Signal-to-noise ratio of the whole line, from that of a pixel.
 ///
 /// ```text
 /// snr √(length · width),   both in independent pixels
 /// ```
 fn line_snr(object: &Object, scene: &Scene) -> f32 {
-    let length = object.length_px / independent(scene);
+    let length = object.length_px / independent_pixel(scene);
     let snr = object.visibility.map_or(f64::INFINITY, |v| v.snr);
     (snr * (length * LINE).sqrt()) as f32
 }
