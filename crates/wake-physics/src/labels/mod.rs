@@ -8,6 +8,7 @@ mod clip;
 mod curve;
 mod dark_line;
 mod empty_list;
+mod independent_pixel;
 mod rows;
 mod short_waves;
 mod visibility;
@@ -21,6 +22,7 @@ use clip::{Polygon, Rectangle};
 use serde::{Deserialize, Serialize};
 use visibility::{Background, Extent};
 
+pub use independent_pixel::independent_pixel;
 pub use visibility::Visibility;
 
 /// A place in the image, (column, row), with fractions.
@@ -175,16 +177,6 @@ pub struct WakeLabel {
 #[must_use]
 pub fn labels_of(scene: &Scene) -> Labels {
     labels(&Prepared::new(scene))
-}
-
-/// Side of an independent pixel of a scene's image \[pixels\]: the resolution of the impulse response over the pixel spacing, at
-/// least 1, as the geometric mean of both directions; 1 without an impulse response.
-#[must_use]
-pub fn independent_pixel(scene: &Scene) -> f64 {
-    let pixels = |resolution: f64| (resolution / scene.grid.spacing).max(1.0);
-    scene.radar.range_resolution.map_or(1.0, |range| {
-        (pixels(range) * pixels(scene.radar.azimuth_resolution)).sqrt()
-    })
 }
 
 /// Labels of a prepared scene; see [`labels_of`].

@@ -1,7 +1,7 @@
 //! Visible extent of a wake, and its expected contrast against sea and speckle, without an image.
 
 use super::dark_line::{DarkLine, DarkNearby};
-use super::independent_pixel;
+use super::independent_pixel::independent_pixel;
 use super::rows::rows_in;
 use super::short_waves::ShortWaves;
 use crate::effects::Effects;
