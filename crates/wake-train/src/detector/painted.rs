@@ -124,6 +124,7 @@ impl Painted {
 }
 
 /// A line along a wake.
+#[derive(Clone, Copy)]
 struct Line {
     /// Contrast at its beginning, relative to the mean.
     contrast: f32,
@@ -170,15 +171,24 @@ fn lines(length: f32, draw: &mut Draw) -> (Vec<Line>, f32) {
         beside: side * 1.8 * dark.width,
         opening,
     };
-    let mut lines = match draw.one_of(&[0.46, 0.24, 0.2, 0.1]) {
+    // A bright line is the axis itself where there is no dark one, or only a fainter one at its side.
+    let axis = Line {
+        beside: 0.0,
+        opening: 0.0,
+        ..bright
+    };
+    let mut lines = match draw.one_of(&[0.36, 0.2, 0.2, 0.14, 0.1]) {
         0 => vec![dark, bright],
         1 => vec![dark],
-        // A bright line alone is the axis itself.
-        2 => vec![Line {
-            beside: 0.0,
-            opening: 0.0,
-            ..bright
-        }],
+        2 => vec![axis],
+        3 => vec![
+            Line {
+                contrast: -axis.contrast * draw.between(0.2, 0.7),
+                beside: side * 1.8 * axis.width,
+                ..dark
+            },
+            axis,
+        ],
         _ => {
             let opening = draw.between(2.0, 16.0).to_radians();
             let arm = |side: f32| Line {
@@ -230,7 +240,7 @@ fn place(mean: &[f32], size: usize, axis_deg: f32, length: f32, draw: &mut Draw)
 
 /// Multiplies a mean by a wake and returns the wake.
 fn wake(mean: &mut [f32], size: usize, speckle: &Speckle, axis_deg: f32, draw: &mut Draw) -> Wake {
-    let length = draw.scale(45.0, 500.0);
+    let length = draw.scale(35.0, 500.0);
     let (lines, half_angle) = lines(length, draw);
     let tip = place(mean, size, axis_deg, length, draw);
     let bend = match draw.chance(0.3) {
