@@ -311,7 +311,7 @@ fn allowed(key: &str) -> Allowed {
     }
     let message = assigned(key, "\"?\"").expect_err("no word").to_string();
     let end = message.find("; write KEY").unwrap_or(message.len());
-    let begins = ["expected one of ", "expected ", "is no ", "': "];
+    let begins = ["expected one of ", "expected ", "is not a ", "': "];
     let begin = begins.iter().find_map(|b| Some(message.find(b)? + b.len()));
     Allowed::Words(message[begin.unwrap_or(0)..end].to_owned())
 }

@@ -120,7 +120,7 @@ fn threads() -> Result<(), String> {
     };
     if number > MOST_THREADS {
         return Err(format!(
-            "{name} is {number}, outside 0 to {MOST_THREADS}; 0 takes one for each core"
+            "{name} is {number}, outside 0 to {MOST_THREADS}; 0 uses one per core"
         ));
     }
     Ok(())

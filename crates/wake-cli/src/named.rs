@@ -26,21 +26,20 @@ pub(crate) fn recipe() -> impl TypedValueParser<Value = ImageRecipe> {
 
 /// Parses a pixel spacing \[m\].
 pub(crate) fn spacing(text: &str) -> Result<f32, String> {
-    bounded(text, 0.5, 100.0, "m")
+    bounded(text, 0.5, 100.0, " m")
 }
 
 /// Parses a score.
 pub(crate) fn score(text: &str) -> Result<f32, String> {
-    bounded(text, 0.0, 1.0, "probability")
+    bounded(text, 0.0, 1.0, "")
 }
 
 fn bounded(text: &str, low: f32, high: f32, unit: &str) -> Result<f32, String> {
-    let number: f32 = text
-        .parse()
-        .map_err(|_| format!("give a number of {unit}"))?;
+    let expected = || format!("expected a number from {low} to {high}{unit}");
+    let number: f32 = text.parse().map_err(|_| expected())?;
     match (low..=high).contains(&number) {
         true => Ok(number),
-        false => Err(format!("it lies outside {low} to {high} {unit}")),
+        false => Err(expected()),
     }
 }
 

@@ -14,7 +14,7 @@ pub(crate) fn bar(length: u64, things: &'static str) -> ProgressBar {
 /// Spinner with the elapsed time, for work whose progress is unknown.
 #[cfg(feature = "simulate")]
 pub(crate) fn clock(what: &'static str) -> ProgressBar {
-    let style = ProgressStyle::with_template("{spinner} {msg}, {elapsed} gone by");
+    let style = ProgressStyle::with_template("{spinner} {msg}, {elapsed} elapsed");
     let clock = ProgressBar::new_spinner()
         .with_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()))
         .with_message(what);

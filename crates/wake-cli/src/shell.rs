@@ -37,7 +37,7 @@ pub(crate) fn man(arguments: &Man, program: Command) -> Outcome<()> {
     clap_mangen::generate_to(program, out)
         .map_err(|error| format!("cannot write to {}: {error}", out.display()))?;
     exit::say(&format!(
-        "manual pages in {}; man -l {}/wake.1",
+        "manual pages in {}; read them with man -l {}/wake.1",
         out.display(),
         out.display()
     ))?;

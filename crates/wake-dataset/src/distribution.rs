@@ -12,6 +12,16 @@ pub(super) enum Value {
     Word(String),
 }
 
+impl std::fmt::Display for Value {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Flag(flag) => write!(f, "{flag}"),
+            Self::Number(number) => write!(f, "{number}"),
+            Self::Word(word) => write!(f, "\"{word}\""),
+        }
+    }
+}
+
 /// Distribution of one value.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]

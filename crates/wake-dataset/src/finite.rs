@@ -23,7 +23,10 @@ impl<S: Source> Dataset<Pair> for Finite<S> {
         };
         let pair = pairs.map_err(DatasetError::new)?.pop();
         pair.ok_or_else(|| {
-            let message = format!("no pair {index}, there are {}", self.length);
+            let message = format!(
+                "there is no pair {index}; the source has {} pairs, counted from 0",
+                self.length
+            );
             DatasetError::new(std::io::Error::other(message))
         })
     }

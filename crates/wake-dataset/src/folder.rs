@@ -31,7 +31,7 @@ impl Folder {
     /// broken or was changed.
     pub fn open(path: &Path) -> Result<Self> {
         let Some(manifest) = Manifest::read(path)? else {
-            let message = "no data set; make one with `wake dataset`";
+            let message = "this folder is not a data set; make one with `wake dataset`";
             return Err(broken(path, 0, message));
         };
         let metadata = Layout(path).metadata();
@@ -95,7 +95,10 @@ impl Folder {
     /// The index and the row of a pair.
     pub(super) fn row(&self, position: u64) -> Result<&(u64, Row)> {
         self.rows.get(position as usize).ok_or_else(|| {
-            let message = format!("no pair {position}, there are {}", self.len());
+            let message = format!(
+                "there is no pair {position}; the set has {} pairs, counted from 0",
+                self.len()
+            );
             broken(&self.path, 0, message)
         })
     }
@@ -131,7 +134,7 @@ fn decoded(path: &Path, bytes: &[u8], [rows, columns]: [usize; 2]) -> Result<Gre
     let size = [image.height() as usize, image.width() as usize];
     if size != [rows, columns] {
         let message = format!(
-            "{} x {} pixels, but the set has {rows} x {columns}",
+            "the image has {} x {} pixels, but the set has {rows} x {columns}; make the set again",
             size[0], size[1]
         );
         return Err(broken(path, 0, message));

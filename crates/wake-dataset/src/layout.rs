@@ -63,7 +63,7 @@ impl std::str::FromStr for Shard {
         let parts = text.split_once('/').map(|(i, n)| (whole(i), whole(n)));
         match parts {
             Some((Some(number), Some(of))) if number < of => Ok(Self { number, of }),
-            _ => Err("a shard is i/n with i from 0 to n − 1, such as 0/4".to_owned()),
+            _ => Err("expected I/N with I from 0 to N − 1, such as 0/4".to_owned()),
         }
     }
 }
@@ -174,7 +174,8 @@ impl Manifest {
             return Err(other_format(&path, manifest.format.into()));
         }
         if manifest.grey != manifest.recipe.grey {
-            let message = "grey and recipe.grey differ; a set has one mapping".to_owned();
+            let message =
+                "grey and recipe.grey differ, but a set has one mapping; restore the file";
             return Err(broken(&path, 1, message));
         }
         let note = Layout(folder).shard_note();
@@ -191,7 +192,7 @@ fn unreadable_manifest(path: &Path, text: &str) -> Error {
         Err(error) => return error,
     };
     let changed = || {
-        let message = "changed: its checksum crc32 does not fit; restore the file, or make the set again in another folder";
+        let message = "the file was changed: its checksum crc32 does not match; restore it, or make the set again in another folder";
         broken(path, 1, message)
     };
     match value["format"].as_u64() {
@@ -202,7 +203,8 @@ fn unreadable_manifest(path: &Path, text: &str) -> Error {
 }
 
 fn other_format(path: &Path, format: u64) -> Error {
-    let message = format!("format {format} is not {FORMAT}; make the set again with this version");
+    let message =
+        format!("format is {format}, expected {FORMAT}; make the set again with this version");
     broken(path, 1, message)
 }
 

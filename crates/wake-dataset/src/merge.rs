@@ -73,7 +73,9 @@ fn shards(folder: &Path) -> Result<Vec<(PathBuf, Manifest)>> {
         if manifest.shard != Some(Shard { number, of })
             || !is_text(&Layout(&path).manifest(), &text)
         {
-            let message = format!("not shard {number} of the same set as shard-0");
+            let message = format!(
+                "this is not shard {number} of the same set as shard-0; make it again with the same recipe, seed and count"
+            );
             return Err(broken(&Layout(&path).manifest(), 1, message));
         }
         shards.push((path, manifest));
@@ -87,9 +89,13 @@ fn shard_at(folder: &Path, number: u64) -> Result<(PathBuf, Manifest)> {
         Some(manifest) if manifest.shard.is_some_and(|shard| shard.number == number) => {
             Ok((path, manifest))
         }
-        Some(_) => Err(broken(&path, 0, format!("not shard {number}"))),
+        Some(_) => {
+            let message =
+                format!("this is not shard {number}; remove the folder and make the shard again");
+            Err(broken(&path, 0, message))
+        }
         None => {
-            let message = format!("shard {number} is missing; make it too, into the same folder");
+            let message = format!("shard {number} is missing; make it in the same folder");
             Err(broken(&path, 0, message))
         }
     }
@@ -106,7 +112,10 @@ fn finished_rows(folder: &Path, path: &Path, manifest: &Manifest) -> Result<(Vec
     };
     let count = manifest.indices().end - manifest.indices().start;
     if rows.len() as u64 != count {
-        return Err(unfinished(format!("{} of {count} pairs", rows.len())));
+        return Err(unfinished(format!(
+            "it has {} of {count} pairs",
+            rows.len()
+        )));
     }
     let grid = &manifest.recipe.scene.grid;
     for (at, (index, row)) in rows.iter().enumerate() {

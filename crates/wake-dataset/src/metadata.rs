@@ -64,8 +64,8 @@ impl Row {
             return Ok(bytes);
         }
         let message = format!(
-            "damaged or another image: its CRC-32 is {found}, line {line} of metadata.jsonl has {}; remove the file and \
-             run `wake dataset` again to make it anew",
+            "the image is damaged or was replaced: its CRC-32 is {found}, but line {line} of metadata.jsonl has {}; remove the \
+             file and run `wake dataset` again",
             self.image_crc32
         );
         Err(broken(path, 0, message))
@@ -98,8 +98,7 @@ impl Row {
         for (path, text) in labels.iter().zip(self.labels(size)) {
             if whole_files::read_bytes(path)? != text.as_bytes() {
                 let message = format!(
-                    "changed: not the labels of line {line} of metadata.jsonl; remove the file and run `wake dataset` again \
-                     to make it anew"
+                    "the labels differ from line {line} of metadata.jsonl; remove the file and run `wake dataset` again"
                 );
                 return Err(broken(path, 0, message));
             }
@@ -232,22 +231,25 @@ pub(super) fn parse(path: &Path, text: &[u8], manifest: &Manifest) -> Result<Row
     let mut indices = manifest.indices();
     let parse = |(at, line): (usize, &[u8])| -> Result<(u64, Row)> {
         let fail = |message: String| broken(path, at + 1, message);
-        let row: Row = serde_json::from_slice(line)
-            .map_err(|e| fail(format!("not a line of a data set: {e}")))?;
+        let row: Row = serde_json::from_slice(line).map_err(|e| {
+            fail(format!(
+                "this is not a line of a data set ({e}); restore it"
+            ))
+        })?;
         let text = std::str::from_utf8(line).ok();
         let text = text.and_then(|line| line.strip_suffix('\n'));
         if text.and_then(unsealed).is_none() {
-            let message = "changed: its checksum crc32 does not fit; restore the line, or remove it and all below it and \
-                           run `wake dataset` again";
+            let message = "the line was changed: its checksum crc32 does not match; restore it, or remove it and all lines \
+                           below it and run `wake dataset` again";
             return Err(fail(message.to_owned()));
         }
         let index = indices
             .next()
-            .ok_or_else(|| fail("more lines than pairs".to_owned()))?;
+            .ok_or_else(|| fail("the set has no more pairs; remove this line".to_owned()))?;
         if row.file_name != image_name(index) {
             let found = &row.file_name;
             return Err(fail(format!(
-                "of {found}, where that of pair {index} belongs; restore the lines in their order"
+                "this line is of {found}, expected that of pair {index}; restore the order of the lines"
             )));
         }
         Ok((index, row))
@@ -271,7 +273,9 @@ fn check(path: &Path, text: &[u8], rows: &Rows, manifest: &Manifest) -> Result<(
             )
         };
         if found != line(&row)?.as_bytes() {
-            let message = format!("not the line of pair {index} of this recipe and seed");
+            let message = format!(
+                "this is not the line of pair {index} of this recipe and seed; restore the line, or use another folder"
+            );
             return Err(broken(path, at + 1, message));
         }
     }

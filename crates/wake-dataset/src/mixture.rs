@@ -46,12 +46,12 @@ impl Mixture {
         let [rows, columns] = first.size();
         for (weight, source) in &sources {
             if !(weight.is_finite() && *weight > 0.0) {
-                let expected = "a number above 0".to_owned();
+                let expected = "a finite number above 0".to_owned();
                 return refused("weight of a mixture", weight.to_string(), expected);
             }
             let [r, c] = source.size();
             if [r, c] != [rows, columns] {
-                let expected = format!("{rows} × {columns} pixels as the first source has");
+                let expected = format!("{rows} × {columns} pixels, as in the first source");
                 let value = format!("{r} × {c} pixels");
                 return refused("size of a mixture's images", value, expected);
             }

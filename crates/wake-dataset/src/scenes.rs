@@ -528,8 +528,8 @@ mod tests {
             ),
             ("base = 3", "paper, ranges, satellites, detector or model"),
             ("[draw.ship]\nsped = [1, 2]", "sped"),
-            ("[draw]\nseed = [1, 2]", "seed of its own"),
-            ("[draw.grid]\nrows = [16, 32]", "one size"),
+            ("[draw]\nseed = [1, 2]", "its own seed"),
+            ("[draw.grid]\nrows = [16, 32]", "the same size"),
             ("[draw.ship]\nspeed = [9, 8]", "draw.ship.speed is [9, 8]"),
             ("[draw.ship]\nspeed = [1, nan]", "draw.ship.speed"),
             (
@@ -551,6 +551,10 @@ mod tests {
             ),
             ("[draw]\ncount = [0, 1.5]", "whole numbers from 0 to 100"),
             ("[draw]\ncount = -1", "whole numbers from 0 to 100"),
+            (
+                "[draw]\ncount = 150",
+                "draw.count is 150, expected whole numbers from 0 to 100",
+            ),
             (
                 "[draw]\n\"quick_look.gain\" = [0, 1]",
                 "draw.quick_look.gain",

@@ -513,7 +513,7 @@ fn a_folder_is_read_back() {
         };
         assert_eq!(without(read), without(made));
     }
-    assert!(refused(set.pair(COUNT), folder.path()).contains("no pair 7, there are 7"));
+    assert!(refused(set.pair(COUNT), folder.path()).contains("no pair 7; the set has 7 pairs"));
     fs::write(folder.path().join("images/000001.png"), "no picture").unwrap();
     refused(set.pair(1), folder.path());
 }

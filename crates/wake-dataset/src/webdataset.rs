@@ -37,7 +37,7 @@ pub fn write_webdataset(folder: &Path, out: &Path, each: u64) -> Result<Vec<Path
     let mut entries = std::fs::read_dir(out).map_err(|e| whole_files::failed("read", out, e))?;
     let is_shard = |name: &std::ffi::OsStr| name.to_string_lossy().ends_with(".tar");
     if entries.any(|entry| entry.is_ok_and(|entry| is_shard(&entry.file_name()))) {
-        let message = "holds shards already; choose another folder, or remove them";
+        let message = "this folder already has tar files; choose another folder, or remove them";
         return Err(broken(out, 0, message));
     }
     let mut written = Vec::new();
@@ -225,7 +225,7 @@ mod tests {
         assert_eq!(indices, ["000000", "000001", "000002", "000003", "000004"]);
         let again = write_webdataset(&set, &outs[0], 2).unwrap_err();
         assert!(
-            again.to_string().contains("holds shards already"),
+            again.to_string().contains("already has tar files"),
             "{again}"
         );
     }

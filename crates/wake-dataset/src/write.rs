@@ -78,15 +78,15 @@ fn check_source(manifest: &Manifest, source: &Simulated) -> Result<()> {
     match (source.sea(), &manifest.sea) {
         _ if !same => Err(refuse(
             "of another recipe or seed",
-            "the manifest's own source",
+            "one of the manifest's recipe and seed",
         )),
         (Some(_), None) => Err(refuse(
             "on a learnt sea",
-            "a manifest that names its file's fingerprint",
+            "a manifest with the fingerprint of its file",
         )),
         (None, Some(_)) => Err(refuse(
             "without a learnt sea",
-            "one, as the manifest names it",
+            "the learnt sea that the manifest names",
         )),
         _ => Ok(()),
     }
@@ -103,7 +103,8 @@ pub(super) fn claim(folder: &Path, manifest: &str, shard: Option<Shard>) -> Resu
         // Compare texts, because numbers parsed from JSON may differ in their last bit.
         Some(found) if found.shard == shard && is_text(&path, manifest) => {}
         Some(_) => {
-            let message = "made with another recipe, seed, count or shard; choose another folder";
+            let message =
+                "this set has another recipe, seed, count or shard; choose another folder";
             return Err(broken(&path, 1, message));
         }
         None if is_free(folder, shard)? => {
@@ -113,7 +114,7 @@ pub(super) fn claim(folder: &Path, manifest: &str, shard: Option<Shard>) -> Resu
             whole_files::write_atomically(&path, manifest.as_bytes())?;
         }
         None => {
-            let message = "no data set, but not empty either; choose another folder";
+            let message = "this folder is not empty and not a data set; choose another folder";
             return Err(broken(folder, 0, message));
         }
     }
@@ -198,8 +199,8 @@ fn make(
         let row = Row::of(&pair, checksum(&png));
         if let Some((line, _)) = lines.get(&index).filter(|(_, kept)| *kept != row) {
             let message = format!(
-                "pair {index} comes out otherwise than this line says, as on another processor or version; go on with \
-                 those that made the set, or make it again in another folder"
+                "pair {index} differs from this line, as it may on another processor or version; continue with those that \
+                 made the set, or make it again in another folder"
             );
             return Err(broken(&Layout(&folder).metadata(), *line, message));
         }

@@ -31,23 +31,26 @@ pub enum Error {
     NoImages { folder: PathBuf },
 
     /// Two images with the same name, whose results could not be distinguished.
-    #[error("two images are called {name:?}; search them one after the other")]
+    #[error(
+        "two images have the name '{}', so their results could not be told apart; search them separately",
+        whole_files::quoted(name)
+    )]
     SameName { name: String },
 
     /// A file that is not a readable image.
     #[error(
-        "{} is no image that can be read ({why}); give a PNG, JPEG or TIFF file of 8 or 16 bits",
+        "{} cannot be read as an image ({why}); give a PNG, JPEG or TIFF file of 8 or 16 bits",
         path.display()
     )]
     Unreadable { path: PathBuf, why: String },
 
     /// A file that is too long.
-    #[error("{} has {bytes} bytes, above {LONGEST_FILE}; cut it into pieces", path.display())]
+    #[error("{} has {bytes} bytes, above the limit of {LONGEST_FILE}; cut it into pieces", path.display())]
     FileTooLong { path: PathBuf, bytes: u64 },
 
     /// An image with too many pixels per side, or none.
     #[error(
-        "{} has {columns} x {rows} pixels, outside 1 to {LONGEST_SIDE} a side; cut it into pieces",
+        "{} has {columns} x {rows} pixels, outside 1 to {LONGEST_SIDE} per side; cut it into pieces",
         path.display()
     )]
     TooLarge {
@@ -58,14 +61,14 @@ pub enum Error {
 
     /// An image that needs too much memory to read.
     #[error(
-        "{} takes {bytes} bytes, above {MOST_MEMORY}; convert it to grey of 8 or 16 bits",
+        "{} needs {bytes} bytes of memory, above the limit of {MOST_MEMORY}; convert it to grey of 8 or 16 bits",
         path.display()
     )]
     TooMuchMemory { path: PathBuf, bytes: u64 },
 
     /// Levels that do not fill an image of the stated size.
     #[error(
-        "an image of {rows} x {columns} pixels was given {levels} levels; give one for each pixel, and at least one"
+        "an image of {rows} x {columns} pixels has {levels} levels; give one level per pixel, and at least one"
     )]
     WrongSize {
         rows: usize,
@@ -75,8 +78,8 @@ pub enum Error {
 
     /// Weights that give unusable maps for an image with one obvious wake.
     #[error(
-        "the weights in {} on {device} give maps that are {why} for an image with one plain wake; \
-         use weights that `wake train detector` has written, or the shipped ones",
+        "the weights in {} on {device} give maps that are {why} for an image with one obvious wake; \
+         use weights written by `wake train detector`, or the shipped weights",
         path.display()
     )]
     WrongMaps {

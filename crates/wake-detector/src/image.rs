@@ -131,7 +131,7 @@ impl GreyImage {
     ///
     /// If there are not `rows · columns` levels.
     pub fn from_levels(rows: usize, columns: usize, levels: &[f32]) -> Self {
-        assert_eq!(levels.len(), rows * columns, "pixels of an image");
+        assert_eq!(levels.len(), rows * columns, "give one level per pixel");
         let levels = levels.iter().map(|x| x.round().clamp(0.0, 255.0) as u8);
         Self {
             rows,
@@ -168,7 +168,7 @@ fn decoder(path: &Path) -> Result<impl ImageDecoder> {
     // Opening a pipe would block until something writes to it.
     let found = std::fs::metadata(path).map_err(io)?;
     if !found.is_file() {
-        return Err(unreadable(path, "no regular file"));
+        return Err(unreadable(path, "not a regular file"));
     }
     let bytes = found.len();
     if bytes > LONGEST_FILE {
@@ -189,7 +189,7 @@ fn decoder(path: &Path) -> Result<impl ImageDecoder> {
     reader.into_decoder().map_err(|error| match error {
         ImageError::Limits(_) => unreadable(
             path,
-            format!("its text is longer than {} MiB", MOST_NOTES >> 20),
+            format!("its metadata exceed {} MiB", MOST_NOTES >> 20),
         ),
         error => unreadable(path, error),
     })
@@ -356,12 +356,9 @@ mod tests {
         };
         let text = with_chunk(&[&900_000_000_u32.to_be_bytes()[..], b"tEXta\0"].concat());
         let sentence = refusal(&text[..33 + 10]);
-        assert!(
-            sentence.contains("text is longer than 64 MiB"),
-            "{sentence}"
-        );
+        assert!(sentence.contains("metadata exceed 64 MiB"), "{sentence}");
         let sentence = refusal(&[0xFF, 0xD8, 0xFF, 0xE1, 0xFF, 0xFF]);
-        assert!(sentence.contains("takes 3000000000 bytes"), "{sentence}");
+        assert!(sentence.contains("needs 3000000000 bytes"), "{sentence}");
     }
 
     /// Reading a pipe without a writer would block forever.
@@ -377,7 +374,7 @@ mod tests {
             std::thread::spawn(move || sender.send(GreyImage::read(&path).map(|_| ())));
             let ended = receiver.recv_timeout(std::time::Duration::from_secs(20));
             let sentence = ended.expect("an end").expect_err("no file").to_string();
-            assert!(sentence.contains("no regular file"), "{sentence}");
+            assert!(sentence.contains("not a regular file"), "{sentence}");
         }
     }
 

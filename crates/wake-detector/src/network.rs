@@ -3,6 +3,7 @@
 use burn::module::{Module, Param};
 use burn::nn::conv::Conv2d;
 use burn::tensor::{Device, Tensor};
+use wake_nn::cast_to;
 use wake_nn::conv::{conv1x1, conv3x3, convolve};
 use wake_nn::norm::GroupNorm;
 use wake_nn::patch::space_to_depth;
@@ -181,13 +182,15 @@ impl Network {
         )
     }
 
-    /// Computes the maps of a batch of images.
+    /// Computes the maps of a batch of images, in the images' type of numbers; layers compute in that of the weights.
     ///
     /// # Shapes
     ///
     /// `[batch, INPUTS, rows, columns]` to `[batch, OUTPUTS, rows / STRIDE, columns / STRIDE]`; rows and columns are
     /// multiples of [`MULTIPLE`].
     pub fn forward(&self, images: Tensor<4>) -> Tensor<4> {
+        let wide = images.dtype();
+        let images = cast_to(images, self.stem.weight.val().dtype());
         let fine = self
             .fine
             .forward(convolve(&self.stem, space_to_depth(images, STRIDE)));
@@ -201,7 +204,7 @@ impl Network {
         let middle = self.middle_up.forward(middle + up);
         let up = self.up1.forward(convolve(&self.narrow1, middle), None);
         let fine = self.fine_up.forward(fine + up);
-        convolve(&self.head, self.norm.forward_silu(fine))
+        cast_to(convolve(&self.head, self.norm.forward_silu(fine)), wide)
     }
 }
 

@@ -33,7 +33,7 @@ pub fn self_check(network: &Network, weights: &Path, device: &Device) -> Result<
         None => Ok(()),
         Some(why) => Err(Error::WrongMaps {
             path: weights.to_owned(),
-            device: format!("{device:?}"),
+            device: wake_nn::device_label(device),
             why,
         }),
     }

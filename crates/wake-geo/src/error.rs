@@ -21,7 +21,7 @@ pub enum Error {
 
     /// A path of unknown format.
     #[error(
-        "{} is no product that can be read ({why}); give a Sentinel-1 GRD product (.SAFE folder or .zip) or a GeoTIFF, \
+        "{} cannot be read as a product ({why}); give a Sentinel-1 GRD product (.SAFE folder or .zip) or a GeoTIFF, \
          PNG or JPEG file",
         shown(path)
     )]
@@ -52,8 +52,7 @@ pub enum Error {
 
     /// Pixels of a product that has no measurement.
     #[error(
-        "{} has annotation but no measurement, so it has places but no pixels; download the product again and unpack it \
-         whole",
+        "{} has annotation but no measurement, so its pixels cannot be read; download the product again and unpack it whole",
         shown(path)
     )]
     NoMeasurement { path: PathBuf },
@@ -82,7 +81,7 @@ pub enum Error {
 
     /// An image without places on Earth.
     #[error(
-        "{file:?} has no places on Earth ({why}); give a GeoTIFF with EPSG code or control points, or a Sentinel-1 product"
+        "pixels of {file:?} cannot be located ({why}); give a GeoTIFF with an EPSG code or control points, or a Sentinel-1 product"
     )]
     NoPlaces { file: String, why: String },
 
@@ -97,8 +96,8 @@ pub enum Error {
 
     /// A window that is empty or not entirely inside the image.
     #[error(
-        "the window of lines {lines:?} and pixels {pixels:?} is empty or leaves the image of {size_lines} lines and \
-         {size_pixels} pixels; cut it at the borders"
+        "the window of lines {lines:?} and pixels {pixels:?} is empty or reaches beyond the image of {size_lines} lines and \
+         {size_pixels} pixels; give a window inside the image"
     )]
     Window {
         lines: std::ops::Range<usize>,
@@ -110,7 +109,7 @@ pub enum Error {
     /// A part of an image that cannot be cut out.
     #[error(
         "the part of lines {lines:?} and pixels {pixels:?} cannot be cut out of an image of {size_lines} lines and \
-         {size_pixels} pixels; give a part inside it of at least {smallest} of both"
+         {size_pixels} pixels; give a part inside it of at least {smallest} lines and {smallest} pixels"
     )]
     Part {
         lines: std::ops::Range<usize>,
@@ -121,7 +120,10 @@ pub enum Error {
     },
 
     /// A product that already exists and would be overwritten.
-    #[error("{} exists; choose another folder, or move it away", shown(path))]
+    #[error(
+        "{} already exists; choose another folder, or move it away",
+        shown(path)
+    )]
     Exists { path: PathBuf },
 
     /// A file that could not be written as requested.

@@ -91,16 +91,16 @@ impl Land {
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = whole_files::read_regular(path).map_err(|e| Error::io(path, e))?;
         let file: Value = serde_json::from_slice(&bytes)
-            .map_err(|e| Error::unreadable(path, format!("no JSON: {e}")))?;
+            .map_err(|e| Error::unreadable(path, format!("it is not valid JSON: {e}")))?;
         let mut land = Self::default();
         land.add(&file);
         let points: usize = land.rings.iter().map(Vec::len).sum();
         match points {
-            0 => Err(Error::unreadable(path, "it holds no GeoJSON polygon")),
+            0 => Err(Error::unreadable(path, "it has no GeoJSON polygon")),
             count if count > MOST_POINTS => Err(Error::unreadable(
                 path,
                 format!(
-                    "{count} points are above the limit of {MOST_POINTS}; give a coarser coast"
+                    "its {count} points exceed the limit of {MOST_POINTS}; give a coarser coastline"
                 ),
             )),
             _ => Ok(land),

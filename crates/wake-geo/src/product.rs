@@ -78,7 +78,7 @@ impl Product {
             _ if polarization.is_some() => {
                 return Err(Error::unreadable(
                     path,
-                    "a polarization can be chosen of Sentinel-1 products only",
+                    "only Sentinel-1 products have a choice of polarization",
                 ));
             }
             b"II*\0" | b"MM\0*" | b"II+\0" | b"MM\0+" => {
@@ -86,13 +86,13 @@ impl Product {
                 Kind::GeoTiff(Box::new(GeoTiff::from_source(&name, Arc::new(file))?))
             }
             b"\x89PNG" | [0xff, 0xd8, 0xff, _] => {
-                let why = "PNG and JPEG files have none".to_owned();
+                let why = "PNG and JPEG files have no geolocation".to_owned();
                 Kind::Picture(Picture::open(path, file)?, Geolocation::Unknown(why))
             }
             _ => {
                 return Err(Error::unreadable(
                     path,
-                    "its first bytes are those of no known format",
+                    "its first bytes match no known format",
                 ));
             }
         };
@@ -216,7 +216,7 @@ impl Product {
         place.ok_or_else(|| {
             let why = match self.geolocation() {
                 Geolocation::Unknown(why) => why.clone(),
-                _ => format!("line {line}, pixel {pixel} lies beyond its map projection"),
+                _ => format!("line {line}, pixel {pixel} lies outside its map projection"),
             };
             Error::NoPlaces {
                 file: sentence(&self.path.to_string_lossy()),

@@ -43,7 +43,10 @@ impl Document {
         let mut elements = 0;
         loop {
             let event = reader.read_event().map_err(|e| {
-                damaged(format!("no XML at byte {} ({e})", reader.error_position()))
+                damaged(format!(
+                    "it is not valid XML at byte {} ({e})",
+                    reader.error_position()
+                ))
             })?;
             let here = open.last_mut().expect("the element above the root");
             match event {
@@ -73,7 +76,7 @@ impl Document {
                 Event::End(_) => {
                     let done = open.pop().expect("the parser checks that ends match");
                     let Some(parent) = open.last_mut() else {
-                        return Err(damaged("an end without a start".to_owned()));
+                        return Err(damaged("it has an end tag without a start tag".to_owned()));
                     };
                     parent.children.push(done);
                 }
@@ -191,7 +194,7 @@ impl<'a> Node<'a> {
         match value.parse::<i64>() {
             Ok(value) if (min..=max).contains(&value) => Ok(value),
             _ => Err(self.error(format!(
-                "{path} is {value:?}, no whole number in [{min}, {max}]"
+                "{path} is {value:?}, expected a whole number in [{min}, {max}]"
             ))),
         }
     }
@@ -215,7 +218,10 @@ impl<'a> Node<'a> {
     fn parsed(self, word: &str) -> Result<f64> {
         match word.parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(self.error(format!("{} is {word:?}, no finite number", self.name()))),
+            _ => Err(self.error(format!(
+                "{} is {word:?}, expected a finite number",
+                self.name()
+            ))),
         }
     }
 }

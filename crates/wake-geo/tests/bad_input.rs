@@ -54,7 +54,7 @@ fn pipes_are_no_products() {
     let pipe = folder.path().join("scene.tif");
     let made = std::process::Command::new("mkfifo").arg(&pipe).status();
     assert!(made.expect("mkfifo").success());
-    says(&sentence(&pipe), &["scene.tif", "no regular file"]);
+    says(&sentence(&pipe), &["scene.tif", "not a regular file"]);
     let files = files();
     let (_kept, safe) = common::folder_of(NAME, &files);
     let measurement = safe.join(&files[MEASUREMENT].0);
@@ -63,7 +63,7 @@ fn pipes_are_no_products() {
         .arg(&measurement)
         .status();
     assert!(made.expect("mkfifo").success());
-    says(&sentence(&safe), &["no regular file"]);
+    says(&sentence(&safe), &["not a regular file"]);
 }
 
 #[test]
@@ -85,7 +85,7 @@ fn missing_files_are_named() {
     let folder = tempfile::tempdir().expect("a folder");
     says(
         &sentence(folder.path()),
-        &["no product that can be read", "annotation/s1"],
+        &["cannot be read as a product", "annotation/s1"],
     );
     says(
         &sentence(&folder.path().join("none.zip")),
@@ -155,7 +155,7 @@ fn impossible_numbers_are_named() {
             0,
             "<latitude>54",
             "<latitude>NaN",
-            ["latitude", "no finite number"],
+            ["latitude", "expected a finite number"],
         ),
         (
             0,
@@ -176,14 +176,14 @@ fn impossible_numbers_are_named() {
             0,
             "radarFrequency>5",
             "radarFrequency>x",
-            ["radarFrequency", "no finite number"],
+            ["radarFrequency", "expected a finite number"],
         ),
         (1, "<line>33", "<line>99999", ["line", "99999"]),
         (
             1,
             "<line>33",
             "<line>0",
-            ["line 0", "after the line before"],
+            ["line 0", "after the previous line"],
         ),
         (
             1,
@@ -221,7 +221,7 @@ fn impossible_numbers_are_named() {
             2,
             "noiseRangeVectorList>",
             "otherList>",
-            ["no XML", "otherList"],
+            ["not valid XML", "otherList"],
         ),
     ] {
         says(&replaced(file, from, to), &parts);
@@ -312,7 +312,7 @@ fn zip_bombs_are_refused() {
     common::zip_of(&path, "a.SAFE", &many, CompressionMethod::Stored);
     says(&sentence(&path), &["number of files", "10000"]);
     std::fs::write(&path, b"PK\x03\x04 no more").expect("a file");
-    says(&sentence(&path), &["no readable zip archive"]);
+    says(&sentence(&path), &["not a readable zip archive"]);
 }
 
 #[test]

@@ -430,7 +430,7 @@ fn images_without_places_have_pixels() {
             .place(0.0, 0.0)
             .expect_err("no places")
             .to_string()
-            .contains("PNG and JPEG files have none")
+            .contains("PNG and JPEG files have no geolocation")
     );
     let outside = product
         .read_window(0..71, 0..1)

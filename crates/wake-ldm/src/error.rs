@@ -28,7 +28,7 @@ pub enum Error {
 
     /// A prompt states nothing about a scene.
     #[error(
-        "the prompt '{}' states nothing of a scene; say, for example, whether there is a ship, its speed and heading, the \
+        "the prompt '{}' states nothing about a scene; say, for example, whether there is a ship, its speed and heading, the \
          wind, or the incidence",
         quoted(prompt)
     )]

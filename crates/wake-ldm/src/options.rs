@@ -47,7 +47,7 @@ impl Options {
 
     /// Takes a whole number, or the default if it is absent.
     pub(crate) fn usize(&mut self, key: &str, default: usize) -> Result<usize> {
-        Ok(self.read(key, "a count", count)?.unwrap_or(default))
+        Ok(self.read(key, "a whole number", count)?.unwrap_or(default))
     }
 
     /// Takes a number, or the default if it is absent.
@@ -73,7 +73,7 @@ impl Options {
         default: &str,
         known: &[(&str, T)],
     ) -> Result<T> {
-        let name = self.read(key, "a text", text)?;
+        let name = self.read(key, "a string", text)?;
         let name = name.unwrap_or_else(|| default.to_owned());
         let found = known.iter().find(|(known, _)| *known == name);
         found.map(|(_, value)| value.clone()).ok_or_else(|| {
@@ -93,18 +93,18 @@ impl Options {
             Some(count) => Some(vec![count; length]),
             None => list(value, count),
         };
-        let found = self.read(key, "a count or a list of counts", counts)?;
+        let found = self.read(key, "a whole number or a list of them", counts)?;
         Ok(found.unwrap_or_else(|| vec![default; length]))
     }
 
     /// Takes a required list of counts.
     pub(crate) fn required_usizes(&mut self, key: &str) -> Result<Vec<usize>> {
-        self.required(key, "a list of counts", |value| list(value, count))
+        self.required(key, "a list of whole numbers", |value| list(value, count))
     }
 
     /// Takes a required list of strings.
     pub(crate) fn required_strings(&mut self, key: &str) -> Result<Vec<String>> {
-        self.required(key, "a list of texts", |value| list(value, text))
+        self.required(key, "a list of strings", |value| list(value, text))
     }
 
     fn required<T>(

@@ -16,7 +16,7 @@ pub enum Error {
     #[error(transparent)]
     File(#[from] whole_files::Error),
     /// The progress file belongs to a search with other inputs.
-    #[error("{} is of another search ({what}); remove it to begin again", path.display())]
+    #[error("{} belongs to another search ({what}); remove it to start over", path.display())]
     OtherSearch {
         /// The progress file.
         path: PathBuf,

@@ -86,6 +86,34 @@ fn there(name: &str, found: usize, is_there: bool) -> Result<()> {
     }
 }
 
+/// The name of a device in messages, as [`device_named`] takes it.
+#[doc(hidden)]
+pub fn device_label(device: &Device) -> String {
+    let known: &[(&str, Device)] = &[
+        #[cfg(feature = "flex")]
+        ("flex", Device::flex()),
+        #[cfg(feature = "ndarray")]
+        #[allow(deprecated, reason = "kept until burn drops it")]
+        ("ndarray", Device::ndarray()),
+        #[cfg(feature = "wgpu")]
+        ("wgpu", Device::wgpu(DeviceKind::DefaultDevice)),
+    ];
+    if let Some((name, _)) = known.iter().find(|(_, one)| one == device) {
+        return (*name).to_owned();
+    }
+    #[cfg(feature = "cuda")]
+    if let Some(number) = (0..64_usize).find(|&number| *device == Device::cuda(number)) {
+        return format!("cuda:{number}");
+    }
+    #[cfg(feature = "wgpu")]
+    if let Some(number) =
+        (0..64_usize).find(|&number| *device == Device::wgpu(DeviceKind::DiscreteGpu(number)))
+    {
+        return format!("wgpu:{number}");
+    }
+    format!("{device:?}")
+}
+
 /// Whether a device is a CPU, whose code is made by compilers and not by drivers.
 pub fn is_cpu(device: &Device) -> bool {
     let cpus: &[Device] = &[
@@ -106,6 +134,7 @@ mod tests {
     fn names_of_compiled_backends_are_devices_and_others_are_named() {
         for name in ["flex", "flex:0"] {
             assert_eq!(device_named(name).expect(name), Device::flex());
+            assert_eq!(device_label(&Device::flex()), "flex");
         }
         #[cfg(feature = "ndarray")]
         assert_ne!(device_named("ndarray").expect("ndarray"), Device::flex());

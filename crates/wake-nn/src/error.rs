@@ -27,7 +27,7 @@ pub enum Error {
     },
 
     /// A number outside its valid closed range.
-    #[error("{name} is {value}, outside [{min}, {max}]")]
+    #[error("{name} is {}, {}", number(*value), expectation(*min, *max))]
     OutOfRange {
         name: String,
         value: f64,
@@ -52,7 +52,7 @@ pub enum Error {
     },
 
     /// A folder holds none of the expected files.
-    #[error("{} holds none of: {}", folder.display(), expected.join(", "))]
+    #[error("{} has none of the expected files: {}", folder.display(), expected.join(", "))]
     MissingFile {
         folder: PathBuf,
         expected: Vec<String>,
@@ -89,7 +89,7 @@ pub enum Error {
     },
 
     /// The device does not support this floating-point type.
-    #[error("device {device} cannot compute in {precision}; use f32")]
+    #[error("device {device} cannot compute in {}; use f32", precision.to_lowercase())]
     UnsupportedPrecision {
         device: String,
         precision: &'static str,
@@ -97,8 +97,8 @@ pub enum Error {
 
     /// No backend of this build has a device with this name.
     #[error(
-        "there is no device '{}' in this build: it has {}; the features flex, ndarray, wgpu and cuda add others, \
-         and a GPU's number may follow, as in cuda:1",
+        "device '{}' is not in this build, which has {}; the features flex, ndarray, wgpu and cuda add devices, and a \
+         GPU's number follows a colon, as in cuda:1",
         quoted(name),
         compiled.join(", ")
     )]
@@ -109,8 +109,9 @@ pub enum Error {
 
     /// The backend is compiled in, but this machine lacks the device.
     #[error(
-        "there is no device '{}' on this machine, where its backend finds {found}; install the driver, or use flex",
-        quoted(name)
+        "device '{}' is not available: its backend finds {}; install the driver, name another GPU, or use flex",
+        quoted(name),
+        gpus(*found)
     )]
     NoDevice {
         name: String,
@@ -119,7 +120,9 @@ pub enum Error {
     },
 
     /// A model produced numbers that are infinite or NaN.
-    #[error("{what} holds numbers that are not finite: the weights do not fit, or are damaged")]
+    #[error(
+        "numbers in {what} are NaN or infinite: the weights are damaged or do not fit the model; load other weights"
+    )]
     NotFinite { what: String },
 
     /// The results of a device differ from those of the reference backend.
@@ -202,6 +205,33 @@ impl std::fmt::Display for Misshapen {
             self.expected,
             quoted(&self.found)
         )
+    }
+}
+
+/// What a closed range allows, as the end of a message.
+fn expectation(min: f64, max: f64) -> String {
+    if max > min {
+        return format!("outside [{}, {}]", number(min), number(max));
+    }
+    match max < min {
+        true => format!("expected at least {}", number(min)),
+        false => format!("expected {}", number(min)),
+    }
+}
+
+/// A number in a message, with an exponent instead of many zeros.
+fn number(value: f64) -> String {
+    match value == 0.0 || !value.is_finite() || (1e-6..1e16).contains(&value.abs()) {
+        true => value.to_string(),
+        false => format!("{value:e}"),
+    }
+}
+
+fn gpus(count: usize) -> String {
+    match count {
+        0 => "no GPU".to_owned(),
+        1 => "1 GPU".to_owned(),
+        count => format!("{count} GPUs"),
     }
 }
 
@@ -322,5 +352,9 @@ mod tests {
         assert!(matches!(refused, Err(Error::OutOfRange { .. })));
         let text = check_range("steps", 0.0, 1.0, 1000.0).map_err(|e| e.to_string());
         assert_eq!(text, Err("steps is 0, outside [1, 1000]".to_owned()));
+        let text = check_range("rows", 128.0, 256.0, 256.0).map_err(|e| e.to_string());
+        assert_eq!(text, Err("rows is 128, expected 256".to_owned()));
+        let text = check_range("sigma", 0.0, 1e-300, 1e300).map_err(|e| e.to_string());
+        assert_eq!(text, Err("sigma is 0, outside [1e-300, 1e300]".to_owned()));
     }
 }

@@ -21,6 +21,8 @@ mod numbers;
 #[cfg(feature = "burn")]
 pub mod activation;
 #[cfg(feature = "burn")]
+pub mod adamw;
+#[cfg(feature = "burn")]
 mod layer_norm;
 #[cfg(feature = "burn")]
 pub mod linear;
@@ -53,7 +55,7 @@ pub mod self_check;
 #[cfg(feature = "burn")]
 pub use burn;
 #[cfg(feature = "burn")]
-pub use device::{device_named, is_cpu};
+pub use device::{device_label, device_named, is_cpu};
 pub use error::{Error, Mismatch, Misshapen, Result, check_range};
 #[cfg(feature = "burn")]
 pub use numbers::{cast_to, check_finite, is_half};

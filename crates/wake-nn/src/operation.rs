@@ -66,7 +66,7 @@ pub(super) fn apply<const N: usize, const D: usize, O: Operation<N>>(
     }))
 }
 
-fn runs_here(tensor: &DispatchTensor) -> bool {
+pub(super) fn runs_here(tensor: &DispatchTensor) -> bool {
     let dtype = |kind: &DispatchTensorKind| match kind {
         DispatchTensorKind::Flex(BackendTensor::Float(tensor)) => Some(tensor.dtype()),
         #[cfg(feature = "autodiff")]
@@ -92,6 +92,26 @@ fn plain(tensor: DispatchTensor) -> FlexTensor {
         )]
         kind => unreachable!("looked at before: {kind:?}"),
     }
+}
+
+/// A tensor outside autodiff whose storage holds its elements alone, in order; for a tensor that [`runs_here`].
+pub(super) fn unshared(tensor: DispatchTensor) -> FlexTensor {
+    let tensor = plain(tensor);
+    match tensor.storage::<f32>().len() == values_of(&tensor).len() {
+        true => tensor,
+        false => {
+            let values = values_of(&tensor).to_vec();
+            self::tensor(values, tensor.layout().shape())
+        }
+    }
+}
+
+/// A tensor outside autodiff.
+pub(super) fn tensor_of<const D: usize>(tensor: FlexTensor) -> Tensor<D> {
+    Tensor::from_dispatch(DispatchTensor {
+        kind: DispatchTensorKind::Flex(BackendTensor::Float(tensor)),
+        autodiff: DispatchAutodiffContext::Disabled,
+    })
 }
 
 /// The elements of a contiguous tensor.

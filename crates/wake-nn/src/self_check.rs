@@ -191,7 +191,7 @@ fn compare_numbers(
         return Ok(());
     }
     Err(Error::WrongNumbers {
-        device: format!("{device:?}"),
+        device: crate::device_label(device),
         stage,
         difference,
         allowed: ALLOWED,

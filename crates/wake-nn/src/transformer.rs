@@ -141,7 +141,7 @@ impl TransformerBlock {
             (Some(norm), Some(attention), Some(context)) => {
                 attention.forward(layer_norm(norm, x.clone()), Some(context.clone())) + x
             }
-            (Some(_), Some(_), None) => panic!("this transformer attends to a context; give one"),
+            (Some(_), Some(_), None) => panic!("this transformer needs a context; pass one"),
             _ => x,
         };
         self.ff.forward(layer_norm(&self.norm3, x.clone())) + x

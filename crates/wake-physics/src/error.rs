@@ -8,7 +8,7 @@ use std::path::PathBuf;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {
     /// A parameter lies outside its closed range.
-    #[error("{name} is {value}, outside {min} to {max} {unit}")]
+    #[error("{name} is {value}, outside {min} to {max}{}", after_space(unit))]
     OutOfRange {
         name: String,
         value: f64,
@@ -67,6 +67,14 @@ impl From<whole_files::Error> for Error {
             path: error.path,
             message: error.source.to_string(),
         }
+    }
+}
+
+/// A unit after a space; nothing for a number without a unit.
+fn after_space(unit: &str) -> String {
+    match unit {
+        "" => String::new(),
+        unit => format!(" {unit}"),
     }
 }
 

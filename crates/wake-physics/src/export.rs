@@ -58,7 +58,7 @@ fn npy(field: &Field) -> Vec<u8> {
 pub fn write_tiff(path: &Path, raster: &crate::Raster, field: &Field) -> Result<()> {
     assert!(
         (field.rows, field.columns) == (raster.rows, raster.columns),
-        "a field of {} x {} on a raster of {} x {}",
+        "the field has {} x {} pixels, but the raster has {} x {}",
         field.rows,
         field.columns,
         raster.rows,
@@ -104,7 +104,7 @@ fn tiff_of(raster: &crate::Raster, field: &Field) -> tiff::TiffResult<Vec<u8>> {
 impl From<Field> for ImageBuffer<Luma<f32>, Vec<f32>> {
     fn from(field: Field) -> Self {
         Self::from_raw(field.columns as u32, field.rows as u32, field.values)
-            .expect("as many values as pixels")
+            .expect("a field has rows × columns values")
     }
 }
 
@@ -128,7 +128,7 @@ impl From<ImageBuffer<Luma<f32>, Vec<f32>>> for Field {
 impl From<Field> for ndarray::Array2<f32> {
     fn from(field: Field) -> Self {
         Self::from_shape_vec((field.rows, field.columns), field.values)
-            .expect("as many values as pixels")
+            .expect("a field has rows × columns values")
     }
 }
 

@@ -299,7 +299,7 @@ impl Field {
         assert_eq!(
             (self.rows, self.columns),
             (other.rows, other.columns),
-            "fields of different size"
+            "the fields differ in size"
         );
         let (mut max, mut sum) = (0.0f64, 0.0);
         for (&a, &b) in self.values.iter().zip(&other.values) {

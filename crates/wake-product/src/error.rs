@@ -24,7 +24,7 @@ pub enum Error {
         why: String,
     },
     /// A product that cannot be used.
-    #[error("{} cannot be simulated: {why}", path.display())]
+    #[error("cannot use {}: {why}", path.display())]
     Template {
         /// The product.
         path: PathBuf,

@@ -84,7 +84,9 @@ fn with_noise(
     if window.no_data > 0 || !window.values.iter().all(|v| v.is_finite()) {
         return Err(Error::Template {
             path: product.path().to_owned(),
-            why: format!("lines {lines:?} and pixels {pixels:?} have no data everywhere"),
+            why: format!(
+                "lines {lines:?} and pixels {pixels:?} include pixels without data; choose a ship farther from them"
+            ),
         });
     }
     let mut values = Vec::with_capacity(window.values.len());

@@ -178,7 +178,7 @@ pub(crate) fn on_map(axes: &PixelAxes, in_scene: f64) -> f64 {
 pub(crate) fn sentinel(product: &Product) -> Result<&Sentinel1> {
     product.sentinel1().ok_or_else(|| Error::Template {
         path: product.path().to_owned(),
-        why: "it is no Sentinel-1 product; give a .SAFE folder or its .zip".to_owned(),
+        why: "it is not a Sentinel-1 product; give a .SAFE folder or its .zip".to_owned(),
     })
 }
 
@@ -196,7 +196,7 @@ fn sensor(product: &Product, sentinel: &Sentinel1) -> Result<&'static str> {
     };
     if !matches!(annotation.polarization, Polarization::VV | Polarization::HH) {
         return Err(refused(format!(
-            "its polarization is {}; VV and HH can be",
+            "its polarization is {}, expected VV or HH",
             annotation.polarization.name()
         )));
     }
@@ -204,7 +204,7 @@ fn sensor(product: &Product, sentinel: &Sentinel1) -> Result<&'static str> {
         "IW" if near(10.0) => Ok("sentinel-1-iw"),
         "EW" if near(40.0) => Ok("sentinel-1-ew"),
         mode => Err(refused(format!(
-            "it is of mode {mode} with pixels of {} m; IW of 10 m and EW of 40 m can be",
+            "its mode is {mode} with pixels of {} m, expected IW with 10 m or EW with 40 m",
             annotation.range_spacing
         ))),
     }

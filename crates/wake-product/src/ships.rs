@@ -42,16 +42,17 @@ pub fn read_ships(path: &Path) -> Result<Vec<ShipAt>> {
         path: path.to_owned(),
         why,
     };
-    let file: Value = serde_json::from_str(&text).map_err(|e| wrong(format!("no JSON: {e}")))?;
+    let file: Value =
+        serde_json::from_str(&text).map_err(|e| wrong(format!("it is not valid JSON: {e}")))?;
     let Some(features) = file.get("features").and_then(Value::as_array) else {
         return Err(wrong(
-            "no GeoJSON FeatureCollection: it has no list \"features\"".to_owned(),
+            "it is not a GeoJSON FeatureCollection: it has no list \"features\"".to_owned(),
         ));
     };
     if features.len() > MOST_SHIPS {
         let count = features.len();
         return Err(wrong(format!(
-            "{count} features are above the limit of {MOST_SHIPS}; split the file"
+            "its {count} features exceed the limit of {MOST_SHIPS}; split the file"
         )));
     }
     let ship = |(n, feature): (usize, &Value)| {
@@ -63,23 +64,30 @@ pub fn read_ships(path: &Path) -> Result<Vec<ShipAt>> {
 fn ship(feature: &Value) -> Result<ShipAt, String> {
     let geometry = &feature["geometry"];
     if geometry["type"] != "Point" {
-        return Err("its geometry is no Point".to_owned());
+        return Err("its geometry is not a Point".to_owned());
     }
     let degrees = |n: usize, name: &str, most: f64| {
-        let value = geometry["coordinates"][n].as_f64();
-        let value = value.filter(|v| (-most..=most).contains(v));
-        value.ok_or_else(|| format!("its {name} is no number from -{most} to {most}"))
+        let value = &geometry["coordinates"][n];
+        let number = value.as_f64().filter(|v| (-most..=most).contains(v));
+        number.ok_or_else(|| {
+            let value = shown(value);
+            format!("its {name} is {value}, expected a number from -{most} to {most}")
+        })
     };
     let empty = Map::new();
     let properties = feature["properties"].as_object().unwrap_or(&empty);
     let number = |key: &str, default: Option<f64>, range: [f64; 2]| -> Result<f64, String> {
-        let value = match (properties.get(key), default) {
-            (None | Some(Value::Null), Some(default)) => Some(default),
-            (value, _) => value.and_then(Value::as_f64),
+        let value = properties.get(key).unwrap_or(&Value::Null);
+        let number = match (value, default) {
+            (Value::Null, Some(default)) => Some(default),
+            _ => value.as_f64(),
         };
         let [least, most] = range;
-        let value = value.filter(|v| (least..=most).contains(v));
-        value.ok_or_else(|| format!("its property {key} is no number from {least} to {most}"))
+        let number = number.filter(|v| (least..=most).contains(v));
+        number.ok_or_else(|| {
+            let value = shown(value);
+            format!("its property {key} is {value}, expected a number from {least} to {most}")
+        })
     };
     let length = number("length", None, [1.0, 500.0])?;
     Ok(ShipAt {
@@ -91,6 +99,14 @@ fn ship(feature: &Value) -> Result<ShipAt, String> {
         beam: number("beam", Some(length / SLENDERNESS[0]), [0.1, 100.0])?,
         draft: number("draft", Some(length / SLENDERNESS[1]), [0.05, 40.0])?,
     })
+}
+
+/// A JSON value in a message.
+fn shown(value: &Value) -> String {
+    match value {
+        Value::Null => "missing".to_owned(),
+        value => whole_files::quoted(&value.to_string()),
+    }
 }
 
 #[cfg(test)]

@@ -86,7 +86,8 @@ pub(crate) fn toml_of(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Option<t
 
 fn toml_at(name: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<Option<toml::Value>> {
     if depth == 0 {
-        let text = format!("{name} holds values in values, deeper than any scene");
+        let text =
+            format!("{name} is nested more than {DEEPEST} levels deep, deeper than any scene");
         return Err(SceneError::new_err(text));
     }
     if value.is_none() {
@@ -140,7 +141,7 @@ fn table(name: &str, dict: &Bound<'_, PyDict>, depth: usize) -> PyResult<toml::T
     for (key, value) in dict.iter() {
         let key = key.cast::<PyString>().map_err(|_| {
             PyTypeError::new_err(format!(
-                "a key of {name} is no text: name keys as scene files do"
+                "a key of {name} is not a string, expected the keys of a scene file"
             ))
         })?;
         let key = key.to_str()?.to_owned();
@@ -163,7 +164,9 @@ fn whole(name: &str, value: &Bound<'_, PyAny>) -> PyResult<toml::Value> {
         return Ok(value.into());
     }
     let value = value.extract::<u64>().map_err(|_| {
-        SceneError::new_err(format!("{name} is a whole number of more than 64 bits"))
+        SceneError::new_err(format!(
+            "{name} is a whole number of more than 64 bits, expected -2^63 to 2^64 - 1"
+        ))
     })?;
     Ok(value.to_string().into())
 }
@@ -197,8 +200,8 @@ pub(crate) fn check_memory(
     match needed.filter(|&needed| needed <= free / 2) {
         Some(_) => Ok(()),
         None => Err(Fault::too_large(format!(
-            "{what}: {count} images of {rows} x {columns} pixels need more than half of the {:.1} GiB that are free; \
-             ask for fewer at a time",
+            "{what}: {count} images of {rows} x {columns} pixels need more than half of the {:.1} GiB of free memory; \
+             ask for fewer images at a time",
             free as f64 / f64::from(1 << 30)
         ))),
     }

@@ -169,7 +169,7 @@ fn assignments(values: &Bound<'_, PyDict>) -> PyResult<Vec<String>> {
     let one = |(key, value): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
         let key: String = key.extract()?;
         let value = toml_of(&key, &value)?
-            .ok_or_else(|| RecipeError::new_err(format!("{key} is None: give a value")))?;
+            .ok_or_else(|| RecipeError::new_err(format!("{key} is None; give a value")))?;
         Ok(format!("{key} = {value}"))
     };
     values.iter().map(one).collect()

@@ -51,7 +51,7 @@ impl PyDetector {
             .all(|n| (1..=LONGEST_SIDE).contains(n))
         {
             let text = format!(
-                "the image has {rows} x {columns} pixels, outside 1 to {LONGEST_SIDE} a side; cut it into pieces"
+                "the image has {rows} x {columns} pixels, outside 1 to {LONGEST_SIDE} per side; cut it into pieces"
             );
             return Err(Fault::array(text).into());
         }

@@ -55,7 +55,7 @@ impl Fault {
         let text = panic.downcast_ref::<String>().map(String::as_str);
         let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
         Self(InternalError::new_err(format!(
-            "a defect of shipwake, please report it: {}",
+            "internal error of shipwake, please report it: {}",
             text.unwrap_or("no message")
         )))
     }

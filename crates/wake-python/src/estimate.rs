@@ -35,9 +35,10 @@ fn estimate<'py>(
         place.or(of_ship.map(|s| s.place)),
         heading.or(of_ship.map(|s| s.heading)),
     ) else {
-        return Err(
-            Fault::option("known has no ship: add one with the assumed hull".to_owned()).into(),
-        );
+        return Err(Fault::option(
+            "known has no ship; add a ship with the assumed hull".to_owned(),
+        )
+        .into());
     };
     let sighting = Sighting {
         place,

@@ -66,12 +66,14 @@ impl PyScene {
         let mut assignments = Vec::new();
         for (key, value) in values.iter() {
             let key = key.cast::<PyString>().map_err(|_| {
-                OptionError::new_err("a key of the values is no text, such as \"ship.speed\"")
+                OptionError::new_err(
+                    "a key of values is not a string, expected a key such as 'ship.speed'",
+                )
             })?;
             let key = key.to_str()?;
             let value = toml_of(key, &value)?;
             let value =
-                value.ok_or_else(|| SceneError::new_err(format!("{key} is None: give a value")))?;
+                value.ok_or_else(|| SceneError::new_err(format!("{key} is None; give a value")))?;
             assignments.push(format!("{key}={value}"));
         }
         Ok(caught(|| Ok(self.0.with_assignments(&assignments)?)).map(Self)?)
@@ -121,7 +123,7 @@ fn text_of(tables: &toml::Value) -> PyResult<String> {
 /// Error of a prompt that states nothing of a scene.
 fn nothing_stated(prompt: &str) -> Fault {
     Fault(crate::error::exceptions::PromptError::new_err(format!(
-        "the prompt '{}' states nothing of a scene; say, for example, whether there is a ship, its speed and heading, the \
+        "the prompt '{}' states nothing about a scene; say, for example, whether there is a ship, its speed and heading, the \
          wind, or the incidence",
         whole_files::quoted(prompt)
     )))

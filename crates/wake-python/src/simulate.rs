@@ -95,7 +95,7 @@ fn simulate_batch<'py>(
     let [count, columns] = [theta.shape()[0], theta.shape()[1]];
     if columns != keys.len() {
         let text = format!(
-            "theta has {columns} columns, but there are {} keys: give a key for each column",
+            "theta has {columns} columns, but there are {} keys; give one key per column",
             keys.len()
         );
         return Err(Fault::array(text).into());
@@ -168,7 +168,7 @@ fn scenes(
         let [was, is] = [base, &scene].map(|s| [s.grid.rows, s.grid.columns]);
         if was != is {
             let text = format!(
-                "row {row} of theta changes the image from {} x {} to {} x {} pixels; all images of a batch have one size",
+                "row {row} of theta changes the image from {} x {} to {} x {} pixels; all images of a batch must have the same size",
                 was[0], was[1], is[0], is[1]
             );
             return Err(Fault::array(text));
@@ -220,7 +220,7 @@ fn levels<'py>(
 fn png<'py>(py: Python<'py>, levels: PyReadonlyArray2<'py, u8>) -> PyResult<Bound<'py, PyBytes>> {
     let view = levels.as_array();
     if view.is_empty() {
-        let text = "an image without pixels has no PNG".to_owned();
+        let text = "the image has no pixels, expected at least one".to_owned();
         return Err(Fault::array(text).into());
     }
     let pixels: Vec<u8> = view.iter().copied().collect();

@@ -159,7 +159,7 @@ def test_missing_pixels_hold_no_wake(detector: Detector) -> None:
         (np.array([[None, object()]]), "object"),
         (None, "object"),
         ("image.png", "real numbers"),
-        ([[1, 2], [3]], "no array"),
+        ([[1, 2], [3]], "not an array"),
     ],
 )
 def test_wrong_images_are_refused(detector: Detector, image: object, words: str) -> None:

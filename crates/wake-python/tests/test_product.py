@@ -78,7 +78,7 @@ def test_refusals(sentinel: Product, picture: Path, tmp_path: Path) -> None:
     for line in (-5, 1e9, float("nan"), "a"):
         with pytest.raises(errors.OptionError):
             sentinel.place(line, 0)  # type: ignore[arg-type]
-    with pytest.raises(errors.ProductError, match="no places"):
+    with pytest.raises(errors.ProductError, match="cannot be located"):
         product.place(0, 0)
     with pytest.raises(errors.OptionError):
         sentinel.locate(10**9, 0)

@@ -114,7 +114,7 @@ def test_a_batch_is_the_simulation_of_its_scenes() -> None:
         ([[5.0]], ["ship.sped"], errors.UnknownKeyError, "sped"),
         ([["fast"]], ["ship.speed"], errors.ArrayError, "expected real numbers"),
         ([[1 + 2j]], ["ship.speed"], errors.ArrayError, "complex"),
-        ([[1.0], [2.0, 3.0]], ["ship.speed"], errors.ArrayError, "no array"),
+        ([[1.0], [2.0, 3.0]], ["ship.speed"], errors.ArrayError, "not an array"),
         ([[64.0]], ["grid.rows"], errors.ArrayError, "row 0"),
         ([[5.0]], "ship.speed", errors.OptionError, "keys"),
         ([[5.0]], [3], errors.OptionError, "a key"),

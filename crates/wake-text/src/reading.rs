@@ -127,7 +127,7 @@ impl fmt::Display for Reading {
     /// Writes the stated values under their scene-file keys, one a line, and a line with the unread parts.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.states_nothing() {
-            write!(f, "the prompt states nothing of a scene")?;
+            write!(f, "the prompt states nothing about a scene")?;
         } else {
             write!(f, "{}", self.scene)?;
         }
@@ -528,7 +528,10 @@ mod tests {
         let expected = "there is a ship\nship.speed = 8 m/s\nnot read: \"swell of 2 m\\u{1b}\"";
         assert_eq!(reading.to_string(), expected);
         let nothing = Reading::of("a photo of a cat").unwrap();
-        assert_eq!(nothing.to_string(), "the prompt states nothing of a scene");
+        assert_eq!(
+            nothing.to_string(),
+            "the prompt states nothing about a scene"
+        );
         let long = Reading::of(&"depth ".repeat(100)).unwrap();
         assert!(long.to_string().chars().count() < 140, "{long}");
     }

@@ -128,7 +128,7 @@ impl fmt::Display for PartialScene {
         f.write_str(match self.ship {
             Some(true) => "there is a ship",
             Some(false) => "there is no ship",
-            None => "nothing is said of a ship",
+            None => "no ship is mentioned",
         })?;
         let values = [
             ("ship.speed", self.ship_speed, "m/s"),

@@ -364,13 +364,13 @@ mod tests {
                 bad_merges("#version: 0.2\na b</w>\nab\n"),
                 "merges.txt",
                 3,
-                "'ab' is no merge",
+                "'ab' is not a merge",
             ),
             (
                 bad_merges("a b</w>\n\na b</w>"),
                 "merges.txt",
                 2,
-                "'' is no merge",
+                "'' is not a merge",
             ),
             (bad_merges("a  b</w>"), "merges.txt", 1, "one space"),
             (
@@ -405,13 +405,13 @@ mod tests {
                 ),
                 "tokenizer.json",
                 3,
-                "'a' is no merge",
+                "'a' is not a merge",
             ),
             (
                 bad_whole("{\"model\": {\"vocab\": {\"a\": 0},\n\"merges\": [\n7]}}"),
                 "tokenizer.json",
                 3,
-                "7 is no merge",
+                "7 is not a merge",
             ),
             (
                 bad_whole("{\n\"version\": 1}"),

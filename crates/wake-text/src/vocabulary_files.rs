@@ -94,7 +94,10 @@ struct SpecialTokens {
 }
 
 #[derive(Deserialize)]
-#[serde(untagged, expecting = "a token, or an object with its \"content\"")]
+#[serde(
+    untagged,
+    expecting = "expected a token, or an object with its \"content\""
+)]
 enum SpecialToken {
     Text(String),
     Object { content: String },
@@ -108,7 +111,10 @@ fn vocab_from(path: &Path, text: &str, entries: HashMap<String, &RawValue>) -> R
     let mut vocab = Vocab::with_capacity(entries.len());
     for (token, raw) in entries {
         let id = value::<u32>(raw)
-            .ok_or_else(|| format!("the id of '{token}' is {raw}, but must be a whole number"))
+            .ok_or_else(|| {
+                let most = u32::MAX;
+                format!("the id of '{token}' is {raw}, expected a whole number from 0 to {most}")
+            })
             .and_then(|id| match used.insert(id, token.clone()) {
                 Some(other) => Err(format!("'{token}' and '{other}' both have the id {id}")),
                 None => Ok(id),
@@ -124,7 +130,7 @@ fn merge_from(raw: &RawValue) -> std::result::Result<(String, String), String> {
     match (value::<(String, String)>(raw), value::<String>(raw)) {
         (Some(merge), _) => Ok(merge),
         (None, Some(line)) => split_merge(&line),
-        (None, None) => Err(format!("{raw} is no merge; it must be two tokens")),
+        (None, None) => Err(format!("{raw} is not a merge, expected two tokens")),
     }
 }
 
@@ -134,7 +140,7 @@ fn split_merge(line: &str) -> std::result::Result<(String, String), String> {
             Ok((left.to_owned(), right.to_owned()))
         }
         _ => Err(format!(
-            "'{line}' is no merge; it must be two tokens with one space between them"
+            "'{line}' is not a merge, expected two tokens with one space between them"
         )),
     }
 }

@@ -78,9 +78,9 @@ impl Checkpoint {
         let (key, there, here) = difference("", &self.state, state)?;
         Some(Error::Value(wake_nn::Error::InvalidOption {
             option: "checkpoint".to_owned(),
-            value: format!("of a run with {key} = {there}"),
+            value: format!("from a run with {key} = {there}"),
             expected: format!(
-                "{here}; go on with what it was begun with, or choose another folder"
+                "{here}; resume with the options of that run, or choose another folder"
             ),
         }))
     }
@@ -175,8 +175,8 @@ fn damaged(file: &Path) -> Error {
         path: file.to_owned(),
         line: 0,
         message: format!(
-            "missing, damaged, or of another version: its checksum does not fit; remove the folder {} to go on from the checkpoint \
-             before it",
+            "missing, damaged, or from another version (its checksum does not match); remove the folder {} to resume from \
+             the previous checkpoint",
             folder.file_name().unwrap_or_default().display()
         ),
     })

@@ -39,7 +39,7 @@ pub enum Error {
     Labels { path: PathBuf, message: String },
 
     /// Training diverged.
-    #[error("training diverged at step {step}: {what}; lower the rate, or look at the data")]
+    #[error("training diverged at step {step} ({what}); lower the learning rate or check the data")]
     Diverged { step: usize, what: String },
 }
 

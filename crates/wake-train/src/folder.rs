@@ -153,8 +153,8 @@ fn compare(path: &Path, model: &Value, data: &Value) -> Result<()> {
     let refuse = |file: &str, (key, there, here): (String, String, String)| {
         Error::Value(wake_nn::Error::InvalidOption {
             option: path.join(file).display().to_string(),
-            value: format!("of a run with {key} = {there}"),
-            expected: format!("{here}; choose another folder, or what that run was begun with"),
+            value: format!("from a run with {key} = {there}"),
+            expected: format!("{here}; use the options of that run, or choose another folder"),
         })
     };
     if let Some(there) = read(&path.join("config.json"))?
@@ -187,15 +187,16 @@ pub(super) fn check_begin(
         (None, true) => Err(Error::Value(wake_nn::Error::InvalidOption {
             option: "resume".to_owned(),
             value: format!(
-                "asked for, but there is no checkpoint in {}",
+                "on, but there is no checkpoint in {}",
                 checkpoints.display()
             ),
-            expected: "a new beginning, without resume".to_owned(),
+            expected: "off for a new run".to_owned(),
         })),
         (Some(step), false) => Err(Error::Value(wake_nn::Error::InvalidOption {
             option: path.display().to_string(),
             value: format!("a run whose stage {stage} has made {step} steps"),
-            expected: "another folder for a new run; resume goes on with this one".to_owned(),
+            expected: "an empty folder; choose another folder for a new run, or resume this one"
+                .to_owned(),
         })),
     }
 }
@@ -286,7 +287,7 @@ mod tests {
         }
         let refused = run.begin("prior", false).unwrap_err().to_string();
         assert!(
-            refused.contains("100 steps") && refused.contains("resume goes on"),
+            refused.contains("100 steps") && refused.contains("resume this one"),
             "{refused}"
         );
         assert_eq!(run.begin("prior", true).unwrap().unwrap().step, 100);

@@ -142,7 +142,7 @@ impl LatentSet {
                 return Err(Error::Value(wake_nn::Error::InvalidOption {
                     option: "grid".to_owned(),
                     value: format!("{size} x {columns} pixels"),
-                    expected: format!("a square of {} pixels", images[0].len()),
+                    expected: format!("a square with the {} pixels of the image", images[0].len()),
                 }));
             }
             let data = TensorData::new(images.concat(), [2, 1, size, size]);
@@ -162,7 +162,7 @@ impl LatentSet {
                 return Err(Error::Value(wake_nn::Error::InvalidOption {
                     option: "image size".to_owned(),
                     value: (8 * shape[1]).to_string(),
-                    expected: format!("{} as before", 8 * self.shape[1]),
+                    expected: format!("{}, as in the images before", 8 * self.shape[1]),
                 }));
             }
             self.shape = shape;

@@ -92,7 +92,7 @@ fn kept_lines(path: &Path, step: usize) -> Result<String> {
             return Err(Error::Data(wake_dataset::Error::Dataset {
                 path: path.to_owned(),
                 line: number + 1,
-                message: "no line of a log of steps; move the file away to go on".to_owned(),
+                message: "not a line of a training log; move the file away to resume".to_owned(),
             }));
         };
         if made <= step as u64 {

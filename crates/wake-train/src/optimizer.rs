@@ -1,7 +1,7 @@
 //! Learning-rate schedule, `AdamW` and EMA.
 
-use burn::optim::{AdamW, AdamWConfig, AdamWState, AdaptiveMomentumState, Optimizer};
 use burn::tensor::Tensor;
+use wake_nn::adamw::Step;
 
 /// Learning-rate schedule: linear warm-up, then half a cosine down to a tenth of the peak.
 ///
@@ -59,136 +59,116 @@ impl Default for AdamOptions {
     }
 }
 
-/// Adam with decoupled weight decay (burn's), with a state that can be stored beside the weights.
+/// Moments of the gradient and averaged weights of every parameter.
 ///
 /// ```text
-/// m ← β₁ m + (1 − β₁) g,    v ← β₂ v + (1 − β₂) g²
-/// w ← (1 − η λ) w − η m̂/(√v̂ + ε),    m̂ = m/(1 − β₁ᵗ),  v̂ = v/(1 − β₂ᵗ)
+/// d = min(decay, 1 − (1 + t)^(−2/3))
 /// ```
+///
+/// The decay d of the averaged weights starts low, so that the initial weights are soon forgotten.
 ///
 /// # References
 ///
-/// Loshchilov & Hutter (2019), "Decoupled Weight Decay Regularization", algorithm 2.
-#[derive(Clone)]
-pub(super) struct Adam {
-    rule: AdamW,
-    /// m and v of each parameter, and t; `None` before the first step.
-    states: Vec<Option<AdamWState<1>>>,
-}
-
-impl Adam {
-    /// New optimizer of `parameters` parameters.
-    pub(super) fn new(options: AdamOptions, parameters: usize) -> Self {
-        let rule = AdamWConfig::new()
-            .with_beta_1(options.beta_1 as f32)
-            .with_beta_2(options.beta_2 as f32)
-            .with_epsilon(options.epsilon as f32)
-            .with_weight_decay(options.weight_decay as f32)
-            .build();
-        Self {
-            rule,
-            states: vec![None; parameters],
-        }
-    }
-
-    /// Optimizer restored after `steps` steps from its averages m and v.
-    pub(super) fn resumed(
-        options: AdamOptions,
-        [first, second]: [Vec<Tensor<1>>; 2],
-        steps: usize,
-    ) -> Self {
-        let mut adam = Self::new(options, first.len());
-        if steps > 0 {
-            let averages = first.into_iter().zip(second);
-            let state = |(m, v)| AdamWState::new(AdaptiveMomentumState::new(steps, m, v));
-            adam.states = averages.map(|pair| Some(state(pair))).collect();
-        }
-        adam
-    }
-
-    /// The averages m and v, zero before the first step.
-    pub(super) fn averages(&self, parameters: &[Tensor<1>]) -> [Vec<Tensor<1>>; 2] {
-        let of = |choose: fn(&AdaptiveMomentumState<1>) -> &Tensor<1>| {
-            let states = self.states.iter().zip(parameters);
-            let one = |(state, like): (&Option<AdamWState<1>>, &Tensor<1>)| match state {
-                Some(state) => choose(&state.momentum).clone(),
-                None => like.zeros_like(),
-            };
-            states.map(one).collect()
-        };
-        [of(|state| &state.moment_1), of(|state| &state.moment_2)]
-    }
-
-    /// Returns the parameters after one step of learning rate `rate` on `gradients · scale`.
-    pub(super) fn step(
-        &mut self,
-        parameters: Vec<Tensor<1>>,
-        gradients: Vec<Tensor<1>>,
-        rate: f64,
-        scale: f64,
-    ) -> Vec<Tensor<1>> {
-        let all = parameters.into_iter().zip(gradients).zip(&mut self.states);
-        let step = |((w, g), state): ((Tensor<1>, Tensor<1>), &mut Option<AdamWState<1>>)| {
-            let (w, new) = self.rule.step(rate, w, g * scale, state.take());
-            *state = new;
-            w
-        };
-        all.map(step).collect()
-    }
-}
-
-impl std::fmt::Debug for Adam {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "Adam of {} parameters", self.states.len())
-    }
-}
-
-/// An exponential moving average of the weights.
-///
-/// ```text
-/// a ← d a + (1 − d) w,    d = min(decay, 1 − (1 + step)^(−2/3))
-/// ```
-///
-/// The decay starts low, so that the initial weights are soon forgotten.
-///
-/// # References
-///
-/// Karras et al. (2024), "Analyzing and Improving the Training Dynamics of Diffusion Models", section 3. The start
-/// follows diffusers' `EMAModel`.
+/// Loshchilov & Hutter (2019), "Decoupled Weight Decay Regularization", algorithm 2. Karras et al. (2024), "Analyzing and
+/// Improving the Training Dynamics of Diffusion Models", section 3; the start of the average follows diffusers' `EMAModel`.
 #[derive(Debug, Clone)]
-pub(super) struct Average {
-    values: Vec<Tensor<1>>,
-    decay: f64,
+pub(super) struct Optimizer {
+    options: AdamOptions,
+    ema_decay: f64,
+    /// m, v and the averaged weights of each parameter.
+    states: Vec<[Tensor<1>; 3]>,
+    /// Steps made, t.
+    steps: usize,
 }
 
-impl Average {
-    /// An average that begins with the given weights.
-    pub(super) fn new(values: Vec<Tensor<1>>, decay: f64) -> Self {
-        Self { values, decay }
+impl Optimizer {
+    /// Optimizer whose averaged weights begin with the given ones.
+    pub(super) fn new(options: AdamOptions, ema_decay: f64, weights: Vec<Tensor<1>>) -> Self {
+        let zero = |average: Tensor<1>| [average.zeros_like(), average.zeros_like(), average];
+        Self {
+            options,
+            ema_decay,
+            states: weights.into_iter().map(zero).collect(),
+            steps: 0,
+        }
+    }
+
+    /// Moments and averaged weights after `steps` steps: m, v and averages of all parameters.
+    pub(super) fn resume(&mut self, [m, v, averages]: [Vec<Tensor<1>>; 3], steps: usize) {
+        let all = m.into_iter().zip(v).zip(averages);
+        self.states = all.map(|((m, v), average)| [m, v, average]).collect();
+        self.steps = steps;
+    }
+
+    /// m, v and averaged weights of all parameters.
+    pub(super) fn state(&self) -> [Vec<Tensor<1>>; 3] {
+        [0, 1, 2].map(|k| self.states.iter().map(|state| state[k].clone()).collect())
     }
 
     /// The averaged weights.
-    pub(super) fn values(&self) -> &[Tensor<1>] {
-        &self.values
+    pub(super) fn averages(&self) -> Vec<Tensor<1>> {
+        self.states.iter().map(|state| state[2].clone()).collect()
     }
 
-    /// The decay after `step` steps.
-    pub(super) fn decay(&self, step: usize) -> f64 {
-        self.decay.min(1.0 - (1.0 + step as f64).powf(-2.0 / 3.0))
+    /// Steps made.
+    pub(super) fn steps(&self) -> usize {
+        self.steps
     }
 
-    /// Updates the average with the weights after step number `step`, counted from 1.
-    pub(super) fn update(&mut self, weights: &[Tensor<1>], step: usize) {
-        let decay = self.decay(step);
-        for (average, weight) in self.values.iter_mut().zip(weights) {
-            *average = average.clone() * decay + weight.clone() * (1.0 - decay);
+    /// Returns the parameters' update for the next step, of learning rate `rate` on `gradients · scale`; it expects every
+    /// parameter once, in order.
+    pub(super) fn step(
+        &mut self,
+        gradients: Vec<Tensor<1>>,
+        rate: f64,
+        scale: f64,
+    ) -> impl FnMut(Tensor<1>) -> Tensor<1> {
+        self.steps += 1;
+        let decay = self.decay();
+        let AdamOptions {
+            beta_1,
+            beta_2,
+            epsilon,
+            weight_decay,
+        } = self.options;
+        let [beta_1, beta_2] = [beta_1, beta_2].map(|beta| beta as f32);
+        let step = Step {
+            beta_1,
+            beta_2,
+            epsilon: epsilon as f32,
+            corrections: [beta_1, beta_2].map(|beta| 1.0 - beta.powi(self.steps as i32)),
+            scale: scale as f32,
+            rate: rate as f32,
+            shrink: (1.0 - rate * f64::from(weight_decay as f32)) as f32,
+            decay: [decay, 1.0 - decay].map(|d| d as f32),
+        };
+        let mut all = gradients.into_iter().zip(&mut self.states);
+        move |weights| {
+            let Some((gradient, state)) = all.next() else {
+                return weights;
+            };
+            // Moved, not shared, so that they can be updated in place.
+            let [m, v, average] = std::mem::replace(
+                state,
+                [0, 1, 2].map(|_| Tensor::empty([0], &weights.device())),
+            );
+            let [weights, m, v, average] = step.apply(gradient, [weights, m, v, average]);
+            *state = [m, v, average];
+            weights
         }
+    }
+
+    /// Decay of the averaged weights at the step made last.
+    fn decay(&self) -> f64 {
+        self.ema_decay
+            .min(1.0 - (1.0 + self.steps as f64).powf(-2.0 / 3.0))
     }
 }
 
 #[cfg(all(test, feature = "flex"))]
 mod tests {
     use super::*;
+    use burn::optim::{AdamWConfig, Optimizer as _};
     use burn::tensor::Device;
 
     #[test]
@@ -214,54 +194,114 @@ mod tests {
         }
     }
 
-    /// Compares with algorithm 2 in 64-bit numbers; after three steps the optimizer is stored and restored.
+    /// Runs steps on one parameter: weights after each step, and the optimizer.
+    fn steps(options: AdamOptions, start: &[f64], gradients: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let device = Device::flex();
+        let tensor = |x: &[f64]| Tensor::<1>::from_floats(x, &device);
+        let mut weights = tensor(start);
+        let mut optimizer = Optimizer::new(options, 0.9, vec![weights.clone()]);
+        let all = gradients.iter().enumerate().map(|(t, gradient)| {
+            let mut update = optimizer.step(vec![tensor(gradient)], rate(t), SCALE);
+            weights = update(weights.clone());
+            drop(update);
+            // After three steps the optimizer is stored and restored.
+            if t == 2 {
+                let state = optimizer.state();
+                optimizer = Optimizer::new(options, 0.9, vec![weights.zeros_like()]);
+                optimizer.resume(state, 3);
+            }
+            weights.to_data().iter::<f64>().collect()
+        });
+        all.collect()
+    }
+
+    const SCALE: f64 = 0.5;
+
+    fn rate(t: usize) -> f64 {
+        1e-2 / (t + 1) as f64
+    }
+
+    const START: [f64; 4] = [1.0, -2.0, 0.5, 3.0];
+
+    fn gradients() -> Vec<Vec<f64>> {
+        let gradient = |t| {
+            [0.3, -1e-3, 20.0, 0.0]
+                .map(|g| g * f64::from(t - 2))
+                .to_vec()
+        };
+        (1..=6).map(gradient).collect()
+    }
+
+    /// Compares with algorithm 2 in 64-bit numbers, also after a restart.
     #[test]
     fn steps_are_those_of_the_algorithm_also_after_a_restart() {
         let options = AdamOptions::default();
         let (b1, b2) = (options.beta_1, options.beta_2);
-        let start = [1.0, -2.0, 0.5, 3.0];
-        let mut numbers = start.map(|w| [w, 0.0, 0.0]);
-        let device = Device::flex();
-        let tensor = |x: [f64; 4]| Tensor::<1>::from_floats(x.map(|x| x as f32), &device);
-        let mut weights = vec![tensor(start)];
-        let mut adam = Adam::new(options, 1);
-        for t in 1..=6 {
-            let gradient = [0.3, -1e-3, 20.0, 0.0].map(|g| g * f64::from(t - 2));
-            let rate = 1e-2 / f64::from(t);
+        let mut numbers = START.map(|w| [w, 0.0, 0.0]);
+        let found = steps(options, &START, &gradients());
+        for (t, gradient) in gradients().into_iter().enumerate() {
             for ([w, m, v], g) in numbers.iter_mut().zip(gradient) {
-                let g = 0.5 * g;
+                let g = SCALE * g;
                 *m = b1 * *m + (1.0 - b1) * g;
                 *v = b2 * *v + (1.0 - b2) * g * g;
-                let (first, second) = (*m / (1.0 - b1.powi(t)), *v / (1.0 - b2.powi(t)));
-                let change = first / (second.sqrt() + options.epsilon);
-                *w = (1.0 - rate * options.weight_decay) * *w - rate * change;
+                let corrected = |x: f64, b: f64| x / (1.0 - b.powi(t as i32 + 1));
+                let change = corrected(*m, b1) / (corrected(*v, b2).sqrt() + options.epsilon);
+                *w = (1.0 - rate(t) * options.weight_decay) * *w - rate(t) * change;
             }
-            weights = adam.step(weights, vec![tensor(gradient)], rate, 0.5);
-            if t == 3 {
-                adam = Adam::resumed(options, adam.averages(&weights), 3);
+            for (a, [b, ..]) in found[t].iter().zip(&numbers) {
+                // Six steps with a few f32 roundings each of numbers up to 3; 1 − β₂ᵗ is known to 1e-5 at t = 1.
+                assert!(
+                    (a - b).abs() < 6.0 * 4.0 * 3.0 * f64::from(f32::EPSILON) + 1e-7,
+                    "{a} {b}"
+                );
             }
         }
-        let found: Vec<f64> = weights[0].to_data().iter::<f64>().collect();
-        for (a, [b, ..]) in found.iter().zip(&numbers) {
-            // Six steps with a few f32 roundings each of numbers up to 3; 1 − β₂ᵗ is known to 1e-5 at t = 1.
-            assert!(
-                (a - b).abs() < 6.0 * 4.0 * 3.0 * f64::from(f32::EPSILON) + 1e-7,
-                "{a} {b}"
-            );
+    }
+
+    /// Weights are those of burn's `AdamW`, bit by bit.
+    #[test]
+    fn steps_are_those_of_burn() {
+        let options = AdamOptions::default();
+        let rule = AdamWConfig::new()
+            .with_beta_1(options.beta_1 as f32)
+            .with_beta_2(options.beta_2 as f32)
+            .with_epsilon(options.epsilon as f32)
+            .with_weight_decay(options.weight_decay as f32)
+            .build();
+        let device = Device::flex();
+        let (mut weights, mut state) = (Tensor::<1>::from_floats(START, &device), None);
+        let found = steps(options, &START, &gradients());
+        for (t, gradient) in gradients().into_iter().enumerate() {
+            let gradient = Tensor::<1>::from_floats(gradient.as_slice(), &device) * SCALE;
+            (weights, state) = rule.step(rate(t), weights, gradient, state);
+            let expected: Vec<f64> = weights.to_data().iter().collect();
+            assert_eq!(found[t], expected, "step {t}");
         }
     }
 
     #[test]
     fn the_average_of_a_ramp_is_the_closed_form() {
         let tensor = |x: f64| Tensor::<1>::from_floats([x as f32], &Device::flex());
-        let mut average = Average::new(vec![tensor(0.0)], 0.5);
+        let still = AdamOptions {
+            weight_decay: 0.0,
+            ..AdamOptions::default()
+        };
+        let mut optimizer = Optimizer::new(still, 0.5, vec![tensor(0.0)]);
         // From step 2 on the decay is 1 − 3^(−2/3) = 0.519 or more, so 0.5: weights 0, 1, …, n leave the
-        // lag d/(1 − d) = 1 once the start is forgotten.
+        // lag d/(1 − d) = 1 once the start is forgotten. A gradient of zero changes no weight.
         for step in 1..=40 {
-            average.update(&[tensor(step as f64)], step);
+            let weights = optimizer.step(vec![tensor(0.0)], 1e-3, 1.0)(tensor(f64::from(step)));
+            assert_eq!(
+                weights.into_scalar::<f32>().to_bits(),
+                (step as f32).to_bits()
+            );
+            if step == 1 {
+                assert!(
+                    (optimizer.decay() - 0.5f64.min(1.0 - 2f64.powf(-2.0 / 3.0))).abs() < 1e-15
+                );
+            }
         }
-        let lag = 40.0 - average.values()[0].clone().into_scalar::<f32>();
+        let lag = 40.0 - optimizer.averages()[0].clone().into_scalar::<f32>();
         assert!((lag - 1.0).abs() < 1e-5, "{lag}");
-        assert!((average.decay(1) - (1.0 - 2f64.powf(-2.0 / 3.0))).abs() < 1e-15);
     }
 }

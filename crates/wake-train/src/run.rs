@@ -86,7 +86,7 @@ impl RunOptions {
         Err(Error::Value(wake_nn::Error::InvalidOption {
             option: "batch".to_owned(),
             value: self.batch.to_string(),
-            expected: format!("a multiple of the {parts} parts that devices and accumulation make"),
+            expected: format!("a multiple of {parts}, devices times accumulation steps"),
         }))
     }
 }

@@ -110,9 +110,9 @@ impl PipelineTraining<'_> {
         }
         Err(Error::Value(wake_nn::Error::InvalidOption {
             option: "image size".to_owned(),
-            value: format!("{rows} x {columns} pixels"),
+            value: format!("{rows} x {columns} pixels in {} images", self.pairs.len()),
             expected: format!(
-                "squares with a multiple of {multiple} on a side; set grid.rows and grid.columns of the data set to that"
+                "at least one image with equal sides, a multiple of {multiple}; set grid.rows and grid.columns of the data set"
             ),
         }))
     }
@@ -277,7 +277,7 @@ fn schedule(scheduler: &SchedulerConfig) -> Result<&NoiseSchedule> {
         Error::Value(wake_nn::Error::Unsupported {
             option: "scheduler".to_owned(),
             value: scheduler.class().to_owned(),
-            supported: "those with a noise schedule".to_owned(),
+            supported: "schedulers with a noise schedule, such as DDIMScheduler".to_owned(),
         })
     })
 }

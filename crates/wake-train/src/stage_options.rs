@@ -41,7 +41,8 @@ pub struct StageOptions {
     pub seed: u64,
     /// Whether to resume from the newest checkpoint.
     pub resume: bool,
-    /// Whether to use gradient checkpointing: fewer activations are kept, and the others are computed again.
+    /// Whether to use gradient checkpointing: burn's elementwise operations are computed again instead of stored. Kernels of
+    /// this project on burn's CPU backend are not.
     pub checkpointing: bool,
     /// Whether losses and gradients are computed in bfloat16; weights keep 32 bits.
     pub bf16: bool,
@@ -109,7 +110,7 @@ impl StageOptions {
         let learning = |device: &Device| {
             if self.bf16 && !device.supports_dtype(DType::BF16) {
                 return Err(Error::Value(wake_nn::Error::UnsupportedPrecision {
-                    device: format!("{device:?}"),
+                    device: wake_nn::device_label(device),
                     precision: "bf16",
                 }));
             }

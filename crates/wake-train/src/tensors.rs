@@ -1,7 +1,7 @@
 //! The parameters of a module as a list of flat tensors, always in the same order.
 
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
-use burn::tensor::{DType, Gradients, Tensor};
+use burn::tensor::{DType, GradientCheckpointingStrategy, Gradients, Tensor};
 
 use wake_nn::cast_to;
 
@@ -35,15 +35,17 @@ pub(super) fn gradients<M: Module>(module: &M, gradients: Gradients) -> Vec<Tens
 ///
 /// When the list does not match the parameters of the module.
 pub(super) fn replaced<M: Module>(module: M, values: Vec<Tensor<1>>) -> M {
-    let mut replacer = Replacer {
-        values: values.into_iter(),
-    };
-    let module = module.map(&mut replacer);
-    assert!(
-        replacer.values.next().is_none(),
-        "more values than parameters"
-    );
+    let mut values = values.into_iter();
+    let module = changed(module, |_| {
+        values.next().expect("one value for each parameter")
+    });
+    assert!(values.next().is_none(), "more values than parameters");
     module
+}
+
+/// Changes the parameters of a module, flat and outside autodiff, in the order of [`values`].
+pub(super) fn changed<M: Module>(module: M, change: impl FnMut(Tensor<1>) -> Tensor<1>) -> M {
+    module.map(&mut Changer { change })
 }
 
 /// Casts the parameters of a module to `bfloat16`; they require gradients where the old ones did.
@@ -82,7 +84,7 @@ struct Values {
 
 impl ModuleVisitor for Values {
     fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
-        self.found.push(flat(plain(&param.val())));
+        self.found.push(flat(param.val().inner()));
     }
 }
 
@@ -100,42 +102,56 @@ impl ModuleVisitor for Differentials {
     }
 }
 
-struct Replacer {
-    values: std::vec::IntoIter<Tensor<1>>,
+struct Changer<F> {
+    change: F,
 }
 
 struct Rounder;
 
 impl ModuleMapper for Rounder {
     fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
-        param.map(|old| relearnt(&old, cast_to(plain(&old), DType::BF16)))
+        param.map(|old| {
+            let learning = Learning::of(&old);
+            learning.given(cast_to(old.inner(), DType::BF16))
+        })
     }
 }
 
-impl ModuleMapper for Replacer {
+impl<F: FnMut(Tensor<1>) -> Tensor<1>> ModuleMapper for Changer<F> {
     fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
-        let value = self.values.next().expect("one value for each parameter");
-        param.map(|old| relearnt(&old, value.reshape(old.dims())))
+        param.map(|old| {
+            let (learning, shape) = (Learning::of(&old), old.dims());
+            learning.given((self.change)(flat(old.inner())).reshape(shape))
+        })
     }
 }
 
-/// A tensor outside autodiff.
-fn plain<const D: usize>(tensor: &Tensor<D>) -> Tensor<D> {
-    if tensor.is_autodiff() {
-        return tensor.clone().inner();
-    }
-    tensor.clone()
+/// State of a parameter in autodiff.
+struct Learning {
+    /// What autodiff stores for the gradients; `None` outside autodiff.
+    strategy: Option<GradientCheckpointingStrategy>,
+    gradient: bool,
 }
 
-/// Gives a new value the autodiff state of the old one.
-fn relearnt<const D: usize>(old: &Tensor<D>, new: Tensor<D>) -> Tensor<D> {
-    if !old.is_autodiff() {
-        return new;
+impl Learning {
+    fn of<const D: usize>(tensor: &Tensor<D>) -> Self {
+        Self {
+            strategy: tensor.gradient_checkpointing_strategy(),
+            gradient: tensor.is_require_grad(),
+        }
     }
-    let new = Tensor::from_inner(new);
-    if old.is_require_grad() {
-        new.require_grad()
-    } else {
-        new
+
+    /// Gives this state to a new value.
+    fn given<const D: usize>(self, new: Tensor<D>) -> Tensor<D> {
+        let Some(strategy) = self.strategy else {
+            return new;
+        };
+        let new = new
+            .autodiff()
+            .with_gradient_checkpointing_strategy(strategy);
+        match self.gradient {
+            true => new.require_grad(),
+            false => new,
+        }
     }
 }

@@ -356,11 +356,33 @@ fn long_gradients_are_shortened_to_the_largest_norm() {
     assert_eq!(trainer.model().num_params(), 2);
 }
 
+/// Gradient checkpointing changes no step; weights keep it after a step, beside data on its device.
+#[test]
+fn checkpointing_changes_no_step() {
+    let device = Device::flex().autodiff();
+    let weights = [device.clone(), device.gradient_checkpointing()].map(|device| {
+        let mut trainer = of_a_plane_on(device, 2);
+        for _ in 0..2 {
+            let report = trainer.step(|layer, device, _| {
+                let point = Tensor::<2>::from_floats([[0.3], [-2.0]], device);
+                (layer.weight.val() * point).sum().exp()
+            });
+            assert!(report.applied);
+        }
+        trainer.model().weight.val().into_data()
+    });
+    assert_eq!(weights[0], weights[1]);
+}
+
 /// A trainer of two weights under the loss w₀ + w₁, whose gradient is the same in every step.
 fn of_a_plane(steps: usize) -> Trainer<burn::nn::Linear> {
-    let device = Device::flex().autodiff();
+    of_a_plane_on(Device::flex().autodiff(), steps)
+}
+
+fn of_a_plane_on(device: Device, steps: usize) -> Trainer<burn::nn::Linear> {
     let layer = burn::nn::LinearConfig::new(2, 1)
         .with_bias(false)
+        .with_initializer(burn::nn::Initializer::Constant { value: 0.5 })
         .init(&device);
     let options = TrainerOptions {
         rate: LrSchedule {

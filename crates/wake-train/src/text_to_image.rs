@@ -54,8 +54,11 @@ impl PromptedImages {
         if size != self.size {
             return Err(Error::Value(wake_nn::Error::InvalidOption {
                 option: "image size".to_owned(),
-                value: format!("{size:?}"),
-                expected: format!("{:?} as before", self.size),
+                value: format!("{} x {} pixels", size[0], size[1]),
+                expected: format!(
+                    "{} x {}, as in the images before",
+                    self.size[0], self.size[1]
+                ),
             }));
         }
         let pixels = pair.image.pixels.iter().map(|&grey| f16::from_f32(grey));

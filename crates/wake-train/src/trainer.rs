@@ -5,8 +5,8 @@ use burn::tensor::{Device, Tensor, TensorData};
 use serde_json::{Value, json};
 
 use super::checkpoint::{Checkpoint, Tensors};
-use super::optimizer::{Adam, AdamOptions, Average, LrSchedule};
-use super::tensors::{gradients, names, replaced, rounded, values};
+use super::optimizer::{AdamOptions, LrSchedule, Optimizer};
+use super::tensors::{changed, gradients, names, replaced, rounded, values};
 use crate::error::{Error, Result};
 use wake_nn::check_range;
 
@@ -114,15 +114,13 @@ pub struct StepReport {
 /// device, which makes the step, as one device would with the whole batch.
 #[derive(Debug)]
 pub(crate) struct Trainer<M> {
-    model: M,
-    adam: Adam,
-    average: Average,
+    /// The model; taken out while a step changes its weights in place.
+    model: Option<M>,
+    optimizer: Optimizer,
     options: TrainerOptions,
     devices: Vec<Device>,
-    /// Steps made.
+    /// Steps made; those of the optimizer are the ones that changed the weights.
     step: usize,
-    /// Steps that changed the weights, as counted by optimizer and average.
-    applied: usize,
     /// Steps since the last one that changed the weights.
     lost: usize,
 }
@@ -135,34 +133,30 @@ impl<M: Module> Trainer<M> {
     /// When there is no device.
     pub(crate) fn new(model: M, options: TrainerOptions, devices: Vec<Device>) -> Self {
         let model = model.fork(devices.first().expect("at least one device"));
-        let weights = values(&model);
         Self {
-            adam: Adam::new(options.adam, weights.len()),
-            average: Average::new(weights, options.ema_decay),
-            model,
+            optimizer: Optimizer::new(options.adam, options.ema_decay, values(&model)),
+            model: Some(model),
             options,
             devices,
             step: 0,
-            applied: 0,
             lost: 0,
         }
     }
 
-    /// Weights, averaged weights, and both averages of the optimizer.
+    /// Weights, averaged weights, and both moments of the optimizer.
     pub(super) fn state(&self) -> [Vec<Tensor<1>>; 4] {
-        let weights = values(&self.model);
-        let [first, second] = self.adam.averages(&weights);
-        [weights, self.average.values().to_vec(), first, second]
+        let [first, second, average] = self.optimizer.state();
+        [values(self.model()), average, first, second]
     }
 
     /// The model as it is now, on its autodiff device.
     pub(super) fn model(&self) -> &M {
-        &self.model
+        self.model.as_ref().expect("a model between steps")
     }
 
     /// The model with averaged weights, outside autodiff.
     pub(crate) fn averaged(&self) -> M {
-        replaced(self.model.valid(), self.average.values().to_vec())
+        replaced(self.model().valid(), self.optimizer.averages())
     }
 
     /// Steps made so far.
@@ -181,12 +175,12 @@ impl<M: Module> Trainer<M> {
     ///
     /// [`Error::Diverged`] when many steps in a row, or all so far, had no finite loss and gradient.
     pub(crate) fn check(&self) -> Result<()> {
-        let never = self.step > 0 && self.applied == 0;
+        let never = self.step > 0 && self.optimizer.steps() == 0;
         if self.lost >= LOST || (never && self.step >= self.options.rate.steps) {
             return Err(Error::Diverged {
                 step: self.step,
                 what: format!(
-                    "the last {} steps had no finite loss and gradient",
+                    "loss or gradient was not finite in the last {} steps",
                     self.lost
                 ),
             });
@@ -207,10 +201,8 @@ impl<M: Module> Trainer<M> {
         let applied = norm.is_finite() && loss.is_finite();
         if applied {
             let scale = (self.options.max_grad_norm / (norm + 1e-6)).min(1.0);
-            let weights = self.adam.step(values(&self.model), gradients, rate, scale);
-            self.applied += 1;
-            self.average.update(&weights, self.applied);
-            self.model = replaced(self.model.clone(), weights);
+            let update = self.optimizer.step(gradients, rate, scale);
+            self.model = self.model.take().map(|model| changed(model, update));
             self.lost = 0;
         } else {
             self.lost += 1;
@@ -244,11 +236,13 @@ impl<M: Module> Trainer<M> {
             parts.reduce(sum).unwrap_or_default()
         };
         let (sums, total) = match self.devices.as_slice() {
-            [device] => work(self.model.clone(), device, 0),
-            devices => in_threads(devices, |device| self.model.clone().fork(device), work),
+            [device] => work(self.model().clone(), device, 0),
+            devices => in_threads(devices, |device| self.model().clone().fork(device), work),
         };
-        let parts = self.parts() as f64;
-        (sums.into_iter().map(|g| g / parts).collect(), total / parts)
+        let count = self.parts();
+        let parts = count as f64;
+        let mean = |g: Tensor<1>| if count == 1 { g } else { g / parts };
+        (sums.into_iter().map(mean).collect(), total / parts)
     }
 }
 
@@ -308,7 +302,7 @@ impl<M: Module> Trainer<M> {
                 if numbers.iter().any(|number| !number.is_finite()) {
                     return Err(Error::Diverged {
                         step: self.step,
-                        what: format!("{group}.{name} holds numbers that are not finite"),
+                        what: format!("{group}.{name} has NaN or infinite numbers"),
                     });
                 }
                 tensors.insert(format!("{group}.{name}"), (shape.clone(), numbers));
@@ -316,7 +310,7 @@ impl<M: Module> Trainer<M> {
         }
         Ok(Checkpoint {
             step: self.step,
-            applied: self.applied,
+            applied: self.optimizer.steps(),
             state: state.clone(),
             tensors,
         })
@@ -342,7 +336,7 @@ impl<M: Module> Trainer<M> {
                 let (_, numbers) = found.ok_or_else(|| {
                     Error::Value(wake_nn::Error::InvalidOption {
                         option: "checkpoint".to_owned(),
-                        value: format!("without {name} {shape:?}"),
+                        value: format!("without the tensor {name} of shape {shape:?}"),
                         expected: "all tensors of the model".to_owned(),
                     })
                 })?;
@@ -357,10 +351,10 @@ impl<M: Module> Trainer<M> {
         let [a, b, c, d] = GROUPS;
         let state = [group(a)?, group(b)?, group(c)?, group(d)?];
         let [weights, average, first, second] = state;
-        self.model = replaced(self.model.clone(), weights);
-        self.average = Average::new(average, self.options.ema_decay);
-        self.adam = Adam::resumed(self.options.adam, [first, second], checkpoint.applied);
-        (self.step, self.applied, self.lost) = (checkpoint.step, checkpoint.applied, 0);
+        self.model = self.model.take().map(|model| replaced(model, weights));
+        self.optimizer
+            .resume([first, second, average], checkpoint.applied);
+        (self.step, self.lost) = (checkpoint.step, 0);
         Ok(())
     }
 }

@@ -162,7 +162,7 @@ fn apart(numbers: &[Vec<f64>; 2]) -> f64 {
 
 fn check(first: &[Field], second: &[Field], options: &TwoSampleOptions) -> Result<()> {
     let images = first.len().min(second.len());
-    check_range("images of each kind", images as f64, 4.0, 1e6)?;
+    check_range("number of images of each kind", images as f64, 4.0, 1e6)?;
     let size = [first[0].rows, first[0].columns];
     let mut all = first.iter().chain(second);
     if first.len() != second.len() || all.any(|image| [image.rows, image.columns] != size) {
@@ -170,7 +170,7 @@ fn check(first: &[Field], second: &[Field], options: &TwoSampleOptions) -> Resul
             option: "images".to_owned(),
             value: format!("{} and {}", first.len(), second.len()),
             expected: format!(
-                "as many of both kinds, all of {} x {} pixels",
+                "the same number of both kinds, all of {} x {} pixels",
                 size[0], size[1]
             ),
         }));
@@ -407,7 +407,7 @@ mod tests {
         let mut wide = white.clone();
         wide[1].values.extend(vec![0.0; SIDE]);
         wide[1].rows += 1;
-        assert!(refused(&OPTIONS, &wide).contains("as many of both kinds"));
+        assert!(refused(&OPTIONS, &wide).contains("the same number of both kinds"));
         let odd = TwoSampleOptions {
             patch: 20,
             ..OPTIONS

@@ -41,9 +41,10 @@ pub fn lock_folder(folder: &Path) -> Result<FolderLock> {
             _folder: Some(handle),
         }),
         Err(TryLockError::WouldBlock) => {
-            let message = "another process works there; wait for it, or choose another folder";
+            let message =
+                "another process uses it; wait for that process, or choose another folder";
             Err(failed(
-                "take the folder",
+                "lock the folder",
                 folder,
                 std::io::Error::other(message),
             ))

@@ -19,7 +19,7 @@ pub fn read_text(path: &Path) -> Result<String> {
     let mut file = open_regular(path).map_err(io)?.take(LONGEST_TEXT + 1);
     file.read_to_string(&mut text).map_err(io)?;
     if text.len() as u64 > LONGEST_TEXT {
-        let message = "longer than 16 MiB";
+        let message = "the file is longer than 16 MiB";
         return Err(io(io::Error::other(message)));
     }
     Ok(text)
@@ -42,7 +42,7 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
 pub fn open_regular(path: &Path) -> io::Result<File> {
     match fs::metadata(path)?.is_file() {
         true => File::open(path),
-        false => Err(io::Error::other("no regular file")),
+        false => Err(io::Error::other("not a regular file")),
     }
 }
 
@@ -92,7 +92,7 @@ mod tests {
         if path.exists() {
             for refused in [read_text(path).map(drop), fingerprint(path).map(drop)] {
                 let refused = refused.unwrap_err().to_string();
-                assert!(refused.contains("no regular file"), "{refused}");
+                assert!(refused.contains("not a regular file"), "{refused}");
             }
         }
         let folder = tempfile::tempdir().unwrap();

@@ -87,7 +87,7 @@ fn images_per_second(source: Arc<dyn Source>, threads: usize, device: &str) -> O
 pub(crate) fn table(rows: &[LoaderRow]) -> String {
     let cores = rayon::current_num_threads();
     let mut text =
-        format!("{cores} cores, batches of {BATCH}; images a second.\n\n| images of | device |");
+        format!("{cores} cores, batches of {BATCH}; images per second.\n\n| images of | device |");
     for threads in threads() {
         text += &format!(" threads {threads} |");
     }

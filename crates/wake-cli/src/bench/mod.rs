@@ -52,14 +52,14 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
         add(&mut rows, &measured)?;
     }
     if asked(Part::Simulator) && arguments.stage.is_empty() {
-        let bar = progress::bar(spacing::COUNT, "rows of the spacing");
+        let bar = progress::bar(spacing::COUNT, "spacing runs");
         let measured = spacing::measure(|| bar.inc(1))?;
         bar.finish_and_clear();
         parts.push(("spacing.md", spacing::table(&measured)));
         add(&mut rows, &measured)?;
     }
     if asked(Part::Model) {
-        let bar = progress::bar(model::PARTS as u64, "rows of the model");
+        let bar = progress::bar(model::PARTS as u64, "model runs");
         let measured = model::measure(|| bar.inc(1))?;
         bar.finish_and_clear();
         let steps = model_row::steps(&measured);
@@ -68,21 +68,21 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
         add(&mut rows, &measured)?;
     }
     if asked(Part::Loader) {
-        let bar = progress::bar(loader::parts(), "rows of the loader");
+        let bar = progress::bar(loader::parts(), "loader runs");
         let measured = loader::measure(&arguments.device, || bar.inc(1))?;
         bar.finish_and_clear();
         parts.push(("loader.md", loader::table(&measured)));
         add(&mut rows, &measured)?;
     }
     if asked(Part::Schedulers) {
-        let bar = progress::bar(schedulers::PARTS as u64, "runs of schedulers");
+        let bar = progress::bar(schedulers::PARTS as u64, "scheduler runs");
         let measured = schedulers::measure(|| bar.inc(1))?;
         bar.finish_and_clear();
         parts.push(("schedulers.md", schedulers::table(&measured)));
         add(&mut rows, &measured)?;
     }
     if arguments.part == Part::Device {
-        let bar = progress::bar(device::parts(&arguments.block), "blocks on the device");
+        let bar = progress::bar(device::parts(&arguments.block), "device blocks");
         let mut lines = Vec::new();
         let measured = device::measure(&arguments.device, &arguments.block, |of_block| {
             bar.inc(1);

@@ -21,7 +21,7 @@ pub(crate) fn measure(largest: usize, stages: &[String]) -> wake_physics::Result
             .filter(|&n| n != plot::FRONTIER_SIZE)
             .map(|n| (n, DEFAULT_TOLERANCE)),
     );
-    let bar = progress::bar((cases.len() * STAGES.len()) as u64, "rows of the simulator");
+    let bar = progress::bar((cases.len() * STAGES.len()) as u64, "simulator runs");
     let (mut rows, mut memo) = (Vec::new(), Memo::default());
     let named = |stage: &&str| stages.is_empty() || stages.iter().any(|named| named == stage);
     for stage in STAGES.into_iter().filter(named) {
@@ -70,7 +70,7 @@ pub(crate) fn table(rows: &[Row]) -> String {
             r.rms_error
         );
     }
-    text + "\n\\* extrapolated: the oracle ran at that many random pixels of this size, where the errors are measured.\n"
+    text + "\n\\* extrapolated from the listed number of random pixels, on which the errors are measured.\n"
 }
 
 /// All rows as CSV.

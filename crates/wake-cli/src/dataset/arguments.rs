@@ -43,7 +43,7 @@ pub(crate) struct Arguments {
     /// also a card
     #[arg(long, value_name = "DIR", conflicts_with = "shard")]
     pub(crate) webdataset: Option<PathBuf>,
-    /// Most images per tar file
+    /// Largest number of images per tar file
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub(crate) per_tar: u64,
     /// Images computed in parallel [default: one per core]

@@ -45,7 +45,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
         exit::say(&format!("{report:#}"))?;
     } else if arguments.merge {
         exit::say(&format!(
-            "{there} images in {place}, joined from its shards"
+            "{there} images in {place}, merged from its shards"
         ))?;
     } else {
         let text = format!("{there} images in {place}, {made} of them made in {seconds:.1} s");
@@ -73,7 +73,7 @@ fn for_others(folder: &Path, manifest: &Manifest, arguments: &Arguments) -> Outc
 fn joined(folder: &Path) -> Outcome<Manifest> {
     merge(folder).map_err(|error| match error {
         wake_dataset::Error::Dataset { .. } => {
-            format!("{error}; `wake dataset --shard I/N` makes share I of N").into()
+            format!("{error}; make shard I of N with `wake dataset --shard I/N`").into()
         }
         error => error.into(),
     })
@@ -132,7 +132,7 @@ fn tell_cost(manifest: &Manifest) -> wake_dataset::Result<()> {
     let total = each * (indices.end - indices.start) as f64;
     if total > LONG {
         exit::note(&format!(
-            "note: some {each:.2} s of a core for each image, {:.1} core-hours in all; --shard shares them among machines",
+            "note: about {each:.2} core-seconds per image, {:.1} core-hours in total; share them among machines with --shard",
             total / 3600.0
         ));
     }

@@ -105,16 +105,17 @@ impl Arguments {
             first.map(|(option, _)| *option)
         };
         if on_product && radon {
-            return Err("--method radon is for images, and this is a product; leave it out".into());
+            return Err("--method radon searches images, not products; leave it out".into());
         }
         if let Some(option) = given(&of_network).filter(|_| radon) {
-            return Err(
-                format!("{option} is for the network; leave it out with --method radon").into(),
-            );
+            return Err(format!(
+                "{option} applies to the network only; leave it out with --method radon"
+            )
+            .into());
         }
         if let Some(option) = given(&of_products).filter(|_| !on_product) {
             return Err(format!(
-                "{option} is for a satellite product, and no product is searched; leave it out"
+                "{option} applies to a satellite product only; leave it out, or search one product"
             )
             .into());
         }

@@ -44,7 +44,11 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     searched?;
     match told.unread.len() {
         0 => Ok(()),
-        count => Err(format!("{count} of {} images were not read; see above", files.len()).into()),
+        count => Err(format!(
+            "{count} of {} images could not be read; see the errors above",
+            files.len()
+        )
+        .into()),
     }
 }
 

@@ -103,7 +103,7 @@ pub(crate) fn run(product: &Product, arguments: &Arguments) -> Outcome<()> {
             arguments
                 .weights
                 .as_ref()
-                .map_or("those of this program".to_owned(), |w| {
+                .map_or("the shipped weights".to_owned(), |w| {
                     w.display().to_string()
                 }),
         ),
@@ -111,14 +111,14 @@ pub(crate) fn run(product: &Product, arguments: &Arguments) -> Outcome<()> {
         (
             "land",
             match (&options.land, options.no_land) {
-                (_, true) => "searched, too".to_owned(),
+                (_, true) => "searched as well".to_owned(),
                 (Some(file), _) => format!(
-                    "{}, and {} m of sea before it, left out",
+                    "left out: {}, with {} m of sea along it",
                     file.display(),
                     options.coast()
                 ),
                 (None, _) => format!(
-                    "Natural Earth 1:10 million, and {} m of sea before it, left out",
+                    "left out: Natural Earth 1:10 million, with {} m of sea along it",
                     options.coast()
                 ),
             },

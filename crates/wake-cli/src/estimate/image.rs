@@ -59,7 +59,8 @@ fn first(
         Some(first) => Ok(first),
         None if (lines, pixels) == (rows, columns) => Ok([0, 0]),
         None => Err(format!(
-            "--image has {lines} x {pixels} pixels but the scene's grid {rows} x {columns}: name the first of them with --at"
+            "--image has {lines} x {pixels} pixels, but the scene's grid has {rows} x {columns}; give its first row and column \
+             with --at"
         )
         .into()),
     }
@@ -76,7 +77,7 @@ fn part(
     };
     if !inside(row, rows, field.rows) || !inside(column, columns, field.columns) {
         return Err(format!(
-            "--at {row},{column}: {rows} x {columns} pixels from there leave the image of {} x {}",
+            "--at {row},{column}: the grid of {rows} x {columns} pixels exceeds the image of {} x {}; choose a smaller row or column",
             field.rows, field.columns
         )
         .into());
@@ -96,16 +97,16 @@ fn speckled(path: &Path) -> Outcome<Field> {
     let bytes = whole_files::read_bytes(path)?;
     let refused = |why: &str| {
         format!(
-            "{}: {why}; `wake simulate` writes such files",
+            "{}: {why}; give fields.safetensors of `wake simulate`",
             path.display()
         )
     };
     let tensors = SafeTensors::deserialize(&bytes).map_err(|error| refused(&error.to_string()))?;
     let tensor = tensors
         .tensor("speckled")
-        .map_err(|_| refused("no tensor `speckled`"))?;
+        .map_err(|_| refused("it has no tensor `speckled`"))?;
     let (&[rows, columns], Dtype::F32) = (tensor.shape(), tensor.dtype()) else {
-        return Err(refused("`speckled` is no image of 32-bit numbers").into());
+        return Err(refused("`speckled` is not an image of 32-bit numbers").into());
     };
     let values = tensor.data().as_chunks().0.iter().copied();
     Ok(Field {
@@ -125,7 +126,11 @@ fn white(path: &Path) -> Outcome<f64> {
         1 => 255.0,
         2 => 65_535.0,
         _ => {
-            return Err(format!("{}: --grey is for images of 8 or 16 bits", path.display()).into());
+            return Err(format!(
+                "{}: --grey applies to images of 8 or 16 bits only; leave it out",
+                path.display()
+            )
+            .into());
         }
     })
 }
@@ -228,7 +233,7 @@ fn in_json(found: &Estimate) -> Value {
 fn in_words(found: &Estimate) -> String {
     let verdict = match found.identifiable {
         true => "estimate",
-        false => "not identifiable: no scene that was found explains the image alone",
+        false => "not identifiable: no single scene explains the image",
     };
     let mut lines = vec![verdict.to_owned()];
     let shown = |e: &Estimated| match e.parameter.unit() {
@@ -251,7 +256,7 @@ fn in_words(found: &Estimate) -> String {
     }
     if let Some([velocity, deviation]) = found.by_echo {
         lines.push(format!(
-            "velocity toward the radar by the echo alone: {velocity:.2} ± {deviation:.2} m/s"
+            "velocity toward the radar from the echo alone: {velocity:.2} ± {deviation:.2} m/s"
         ));
     }
     lines.push(format!(

@@ -10,7 +10,7 @@ pub(super) fn line(parameter: Parameter, value: Option<f64>, deviation: f64) -> 
         true => format!("{name:<12} {value}± {deviation:.3} {}", parameter.unit())
             .trim_end()
             .to_owned(),
-        false => format!("{name:<12} cannot be told"),
+        false => format!("{name:<12} not determined"),
     }
 }
 
@@ -23,6 +23,6 @@ mod tests {
         let text = line(Parameter::Size, Some(195.0), 1.5);
         assert_eq!(text, "length         195.000 ± 1.500 m");
         let unknown = line(Parameter::Texture, Some(0.0), f64::INFINITY);
-        assert_eq!(unknown, "texture      cannot be told");
+        assert_eq!(unknown, "texture      not determined");
     }
 }

@@ -16,7 +16,7 @@ use wake_physics::{Scene, simulate};
 
 /// Estimate ship and wind from an image of a wake, with error bars.
 ///
-/// With --image, searches for the ship within some 150 m and 7 degrees of place and heading in --scene, at any speed
+/// With --image, searches for the ship within about 150 m and 7 degrees of place and heading in --scene, at any speed
 /// from 3.5 to 17 m/s, by maximum likelihood. With --bound, prints the smallest standard deviations of any unbiased
 /// estimate (Cramér–Rao bound) and needs no image. Without either, simulates the scene and estimates it, starting from
 /// a wrong place and heading.
@@ -43,7 +43,7 @@ pub(crate) struct Arguments {
     /// Print the Cramér–Rao bounds of ship and wind for an image of the scene
     #[arg(long)]
     bound: bool,
-    /// Draw the speed bound by wind and heading for seven sensors as an SVG (some 10 minutes on two cores)
+    /// Draw the speed bound by wind and heading for seven sensors as an SVG (about 10 minutes on two cores)
     #[cfg(feature = "train")]
     #[arg(long, value_name = "FILE", requires = "bound", conflicts_with = "json")]
     map: Option<PathBuf>,
@@ -80,7 +80,8 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
         true => bound::told(&scene, &priors, arguments.json)?,
         false => {
             let sighting = Sighting::of_ship(&scene);
-            let sighting = sighting.ok_or("the scene has no ship: name its place and heading")?;
+            let sighting =
+                sighting.ok_or("the scene has no ship; set ship.position and ship.heading")?;
             let (field, sighting) = match &arguments.image {
                 Some(path) => {
                     let field = image::read(path, arguments.at, arguments.grey.as_ref(), &scene)?;
@@ -111,12 +112,16 @@ fn grey(text: &str) -> Result<GreyScale, String> {
     let mapping = match parts.get(2) {
         None | Some(&"amplitude") => Mapping::Amplitude,
         Some(&"decibel") => Mapping::Decibel,
-        Some(other) => return Err(format!("the mapping {other} is not amplitude or decibel")),
+        Some(other) => {
+            return Err(format!(
+                "mapping is '{other}', expected amplitude or decibel"
+            ));
+        }
     };
     let number = |n: usize| parts.get(n).and_then(|part| part.parse().ok());
     let (Some(darkest_db), Some(brightest_db), true) = (number(0), number(1), parts.len() < 4)
     else {
-        return Err("it is two numbers of decibels such as -25,-3".to_owned());
+        return Err("expected two levels in dB, such as -25,-3".to_owned());
     };
     let grey = GreyScale {
         darkest_db,
@@ -133,6 +138,6 @@ fn row_and_column(text: &str) -> Result<[usize; 2], String> {
     let numbers = pair.map(|(row, column)| (row.trim().parse(), column.trim().parse()));
     match numbers {
         Some((Ok(row), Ok(column))) => Ok([row, column]),
-        _ => Err("it is two whole numbers such as 1200,3400".to_owned()),
+        _ => Err("expected two whole numbers, such as 1200,3400".to_owned()),
     }
 }

@@ -44,10 +44,10 @@ pub(crate) struct Options {
     /// Whether the model draws speckle [default: as in the data set]
     #[arg(long)]
     speckle: Option<bool>,
-    /// Schedulers, separated by commas; the first draws all images [default: the model's own]
+    /// Schedulers, separated by commas; the first generates all images [default: the model's own]
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     scheduler: Vec<String>,
-    /// Steps of each scheduler, separated by commas; the first number draws all images
+    /// Steps of each scheduler, separated by commas; the first generates all images
     #[arg(long, value_delimiter = ',', default_value = "50", value_parser = clap::value_parser!(u32).range(1..=1000))]
     steps: Vec<u32>,
     /// DDIM steps of the reference images for the error of each scheduler [default: no reference]
@@ -158,8 +158,8 @@ impl Options {
         let grid = &recipe.scene.grid;
         if [grid.rows, grid.columns] != [rows, columns] {
             return Err(format!(
-                "the data set has {} x {} pixels, but the model of --weights draws {rows} x {columns}; give --data of the \
-                 data set that it learnt from",
+                "the data set has {} x {} pixels, but the model of --weights generates {rows} x {columns}; give its \
+                 training set as --data",
                 grid.rows, grid.columns
             )
             .into());

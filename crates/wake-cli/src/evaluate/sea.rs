@@ -35,7 +35,7 @@ pub(crate) struct Options {
     /// Recipes whose open seas are compared: satellites, detector or a TOML file; may be repeated
     #[arg(long, value_name = "NAME", default_values = ["satellites", "detector"])]
     recipe: Vec<String>,
-    /// Most windows of open sea per half image
+    /// Largest number of windows of open sea per half image
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u8).range(1..))]
     windows: u8,
     /// Device: flex, ndarray, wgpu or cuda, if compiled in
@@ -72,7 +72,7 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
     if pairs.len() < 4 || images.len() < 2 {
         let (place, found) = (options.real.display(), pairs.len());
         return Err(format!(
-            "--real {place}: {found} windows of open sea in both halves of {} images, at least 4 of 2 images are needed",
+            "--real {place}: {found} windows of open sea in both halves of {} images, expected at least 4 in 2 images; add images",
             images.len()
         )
         .into());

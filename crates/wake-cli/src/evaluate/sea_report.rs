@@ -44,10 +44,10 @@ pub(crate) fn markdown(report: &SeaReport) -> String {
 /// Table of the seas of recipes.
 fn recipes(report: &SeaReport) -> String {
     let mut text = format!(
-        "Share of windows of 128 x 128 pixels of open sea that are classified right, simulated or real: 0.5 where the kinds are \
-         alike. {} windows of the right halves of {} real images stand against as many of each recipe, in levels of 8 bits. A linear \
-         discriminant of each group of features is tested on the image that it was not trained on; a small network, trained on half of \
-         the windows, on patches of 64 x 64 pixels of the others. Intervals of 95 %, over images and windows.\n\n| features |",
+        "Accuracy of classifiers between simulated and real open sea (0.5: indistinguishable): {} windows of 128 x 128 pixels from the \
+         right halves of {} real images, and as many of each recipe, in 8-bit levels. A linear discriminant of each group of features \
+         is tested on the image left out of its training; a small network, trained on half of the windows, on patches of 64 x 64 \
+         pixels of the others. 95 % intervals over images and windows.\n\n| features |",
         report.windows, report.open_images
     );
     for row in &report.recipes {
@@ -78,11 +78,10 @@ fn recipes(report: &SeaReport) -> String {
 fn learnt(report: &SeaReport) -> String {
     let mut text = format!(
         "{}\n\n\
-         {} windows of 128 x 128 pixels of open sea of the right halves of {} real images are compared with as many of each kind, \
-         as levels of 8 bits. The sea was learnt from the left halves alone (`wake train sea --half left`), without labels. What is \
-         drawn like a left window has its median.\n\n\
-         ![Gaussian noise of four styles, and below it what the flow makes of the same noise](learned_sea.png)\n\n\
-         Four styles: above, Gaussian noise with their correlations; below, what the flow makes of the same noise.\n\n\
+         {} windows of 128 x 128 pixels of open sea from the right halves of {} real images are compared with as many of each kind, \
+         in 8-bit levels. The sea was learnt from the left halves alone (`wake train sea --half left`), without labels.\n\n\
+         ![Gaussian noise of four styles, and the flow's output below](learned_sea.png)\n\n\
+         Four styles: Gaussian noise with their correlations above, the flow's output from the same noise below.\n\n\
          | sea | classifier accuracy | spectrum dB | along rows 1, 2 | along columns 1, 2 | skewness | blocks of 8, 32 |\n\
          | --- | --- | --- | --- | --- | --- | --- |\n",
         finding(report),
@@ -98,14 +97,14 @@ fn learnt(report: &SeaReport) -> String {
             row.kind, row.spectrum_db, row.skewness
         );
     }
-    text + "\nClassifier accuracy: that of a small network, trained on half of the windows, on patches of 64² pixels of the others, \
-        with its 95 % interval over the windows ([evaluation](evaluation.md#two-sample-test-and-shape-of-the-sea)); variation \
-        between trainings is not included. Spectrum: root mean square difference of the radial spectrum over all rings. \
-        Correlations, skewness and the variation of block means are those of `measure::texture`, means over the windows. Gaussian \
-        noise has the mean, spread and correlations (to 32 pixels) of one left window each; the learnt sea in the styles of the \
-        left windows starts from that noise. With its own styles it draws those of random patches of its file, so images and \
-        sensors have other shares than among the windows, which the network notices too. Windows leave out what `wake train sea` \
-        leaves out; unmasked wakes are in both halves.\n"
+    text + "\n- Classifier accuracy: [two-sample test](evaluation.md#two-sample-test-and-shape-of-the-sea) on patches of 64² pixels, with \
+        its 95 % interval over the windows; variation between trainings is not included.\n\
+        - Spectrum: root mean square difference of the radial spectrum over all rings.\n\
+        - Correlations, skewness, variation of block means: `measure::texture`, means over the windows.\n\
+        - Gaussian noise: mean, spread and correlations (to 32 pixels) of one left window each; in the styles of the left windows, \
+        the learnt sea starts from that noise and has the window's median.\n\
+        - Its own styles: random patches of its file, with another mix of images and sensors, which also raises the accuracy.\n\
+        - Windows exclude what `wake train sea` excludes; unmasked wakes are in both halves.\n"
 }
 
 fn accuracy(found: &TwoSample) -> String {
@@ -131,19 +130,18 @@ fn finding(report: &SeaReport) -> String {
     // Two independent intervals of 95 %.
     let doubt = gaussian.1.half_width.hypot(learnt.1.half_width);
     let verdict = if gain > doubt {
-        "the flow adds what a classifier sees beyond a spectrum"
+        "the flow adds structure beyond the spectrum"
     } else if gain < -doubt {
         "the flow makes the sea less like the real one"
     } else {
-        "the flow adds nothing that a classifier sees"
+        "the flow adds nothing that the classifier detects"
     };
     let skewness = |row: &SeaRow| format!("{:.2}", row.skewness);
     format!(
-        "A classifier tells the learnt sea from the real one on {} of the patches (0.5: indistinguishable), Gaussian noise with the \
-         same correlations on {}: {verdict}. The simulated sea of the recipe satellites, which was not fitted to these images, is \
-         recognised on {}, the other halves of the same images on {}. Skewness is {} in real windows, {} in learnt and {} in \
-         Gaussian ones; means of blocks of 32 pixels vary by {:.3}, {:.3} and {:.3}; the spectrum is {:.2} dB off, that of Gaussian \
-         noise {:.2} dB.",
+        "A classifier separates the learnt sea from the real one with an accuracy of {} (0.5: indistinguishable), Gaussian noise of the \
+         same correlations with {}: {verdict}. Simulated sea, which was not fitted to these images, scores {}, the other halves of \
+         the same images {}. Skewness is {} in real, {} in learnt and {} in Gaussian windows, variation of 32-pixel blocks {:.3}, \
+         {:.3} and {:.3}; the spectra of learnt and Gaussian sea are {:.2} and {:.2} dB off.",
         accuracy(&learnt.1),
         accuracy(&gaussian.1),
         accuracy(&simulated.1),

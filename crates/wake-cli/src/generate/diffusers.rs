@@ -28,9 +28,10 @@ pub(crate) fn run(arguments: &Arguments, weights: &Path) -> Outcome<()> {
         (arguments.overlay, "--overlay"),
     ] {
         if given {
-            return Err(
-                format!("{option} is for the wake model; leave it out, or --weights").into(),
-            );
+            return Err(format!(
+                "{option} applies to the wake model only; leave it out, or leave out --weights"
+            )
+            .into());
         }
     }
     let scene = arguments.scene(Scene::default)?;
@@ -61,8 +62,8 @@ pub(crate) fn run(arguments: &Arguments, weights: &Path) -> Outcome<()> {
 fn check_grid(scene: Option<&Scene>, [rows, columns]: [usize; 2]) -> Result<(), String> {
     match scene.map(|scene| &scene.grid) {
         Some(grid) if [grid.rows, grid.columns] != [rows, columns] => Err(format!(
-            "the scene's grid is {} × {} pixels, but the model makes {rows} × {columns}; set grid.rows and \
-             grid.columns to that",
+            "the scene's grid is {} × {} pixels, but the model makes {rows} × {columns}; set \
+             grid.rows={rows} and grid.columns={columns}",
             grid.rows, grid.columns
         )),
         _ => Ok(()),

@@ -21,11 +21,11 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
         None => wake_model::run(arguments),
         Some(folder) if folder.join("unet").is_dir() => diffusers::run(arguments, folder),
         Some(_) if arguments.lora.is_some() => {
-            Err("--lora is for a model in diffusers layout; leave it out".into())
+            Err("--lora applies to models in diffusers layout only; leave it out".into())
         }
         Some(folder) if folder.join("config.json").is_file() => wake_model::run(arguments),
         Some(folder) => Err(format!(
-            "--weights {}: no model there; a folder that `wake train` wrote holds config.json, one in diffusers layout unet/",
+            "--weights {}: no model found; expected config.json (from `wake train`) or unet/ (diffusers layout) in this folder",
             folder.display()
         )
         .into()),

@@ -60,7 +60,10 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
         for part in &reading.unread {
             exit::say(&format!("not read: {}", part.text))?;
         }
-        exit::say(&format!("drawn: {}", wake_text::prompt(&images[0].scene)?))?;
+        exit::say(&format!(
+            "generated: {}",
+            wake_text::prompt(&images[0].scene)?
+        ))?;
     }
     finish(arguments, &report)
 }
@@ -84,7 +87,7 @@ fn refuse_options(arguments: &Arguments) -> Result<(), String> {
     ];
     if let Some((flag, _)) = given.iter().find(|(_, given)| *given) {
         return Err(format!(
-            "{flag} is for models in diffusers layout; leave it out, or name one with --weights"
+            "{flag} applies to models in diffusers layout only; leave it out, or give one with --weights"
         ));
     }
     if !(1..=256).contains(&arguments.count) {

@@ -97,7 +97,7 @@ fn scenes(arguments: &Arguments) -> Outcome<Vec<(String, Scene)>> {
             .into_owned();
         if scenes.iter().any(|(other, _)| *other == name) {
             let path = path.display();
-            return Err(format!("{path}: another scene file is called {name} too, and each has a folder of its name; rename one").into());
+            return Err(format!("{path}: another scene file has the name {name}, which is also the name of its folder; rename one").into());
         }
         scenes.push((name, changed(Scene::read(path)?)?));
     }

@@ -100,7 +100,7 @@ pub(crate) fn run(
         })
         .to_string(),
         false => format!(
-            "{}, {} of {given} ships in it: {}",
+            "{} with {} of {given} ships, listed in {}",
             written.product.display(),
             written.count,
             written.ships.display()

@@ -52,10 +52,10 @@ pub(crate) struct Options {
 }
 
 fn epochs(text: &str) -> Result<f64, String> {
-    let number: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    let number: f64 = text.parse().map_err(|_| "expected a number".to_owned())?;
     match number > 0.0 && number <= 1e6 {
         true => Ok(number),
-        false => Err("an epoch is a pass over all pairs: above 0, up to 1e6".to_owned()),
+        false => Err("expected a number above 0, up to 1e6".to_owned()),
     }
 }
 
@@ -92,8 +92,8 @@ fn warn_of_disk(tuning: &FineTuning<'_>) -> Outcome<()> {
     if checkpoint >= UNWARNED {
         let gb = |bytes: u64| bytes as f64 * 1e-9;
         exit::note(&format!(
-            "note: a checkpoint takes {:.1} GB and the model {:.1} GB; with --keep {keep}, {:.0} GB are needed while one is \
-             written, every {} steps",
+            "note: a checkpoint takes {:.1} GB and the model {:.1} GB; with --keep {keep}, up to {:.0} GB are \
+             needed (a checkpoint every {} steps)",
             gb(checkpoint),
             gb(model),
             gb(most),

@@ -50,7 +50,7 @@ pub(crate) struct Thrift {
     /// Gradient accumulation: number of parts of a batch that are computed one after another, to save memory
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
     accumulation: u16,
-    /// Gradient checkpointing: uses less memory, but is slower
+    /// Gradient checkpointing: recompute burn's elementwise operations instead of storing them; saves no memory on the CPU
     #[arg(long)]
     checkpointing: bool,
     /// Compute losses and gradients in bfloat16 if the device supports it; weights stay in 32 bits

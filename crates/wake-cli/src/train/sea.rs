@@ -107,7 +107,7 @@ fn patches(options: &Options, files: &[SeaFile]) -> Outcome<SeaPatches> {
     bar.finish_and_clear();
     if patches.is_empty() {
         return Err(format!(
-            "--images {}: no patch of 128 x 128 pixels of open sea; give larger images, or masks that leave more",
+            "--images {}: no patch of 128 x 128 pixels of open sea; give larger images or smaller masks",
             options.images.display()
         )
         .into());

@@ -6,6 +6,7 @@ use clap::Args;
 use wake_dataset::{Folder, Recipe};
 use wake_ldm::network::WakeModelConfig;
 use wake_physics::available_memory;
+use wake_physics::grey::{GreyScale, Mapping};
 use wake_train::TrainingPairs;
 
 use crate::exit::Outcome;
@@ -49,9 +50,11 @@ impl Pairs {
         let (found, grey) = (folder.manifest().grey, config.grey);
         if found != grey {
             return Err(format!(
-                "--data {}: grey is {found:?}, but the model's is {grey:?}; make the set with the recipe's grey, or train \
-                 another model in another --out",
-                path.display()
+                "--data {}: grey is {}, but the model's is {}; make the set with the model's grey, or train another model \
+                 in another --out",
+                path.display(),
+                in_words(&found),
+                in_words(&grey)
             )
             .into());
         }
@@ -63,11 +66,25 @@ impl Pairs {
     }
 }
 
+/// A grey scale in a message.
+fn in_words(grey: &GreyScale) -> String {
+    let mapping = match grey.mapping {
+        Mapping::Decibel => "decibels",
+        Mapping::Amplitude => "amplitude",
+    };
+    let [darkest, brightest] = [grey.darkest_db, grey.brightest_db];
+    format!("linear in {mapping} from {darkest} to {brightest} dB")
+}
+
 /// Opens a data set that is not empty.
 pub(crate) fn folder(path: &Path) -> Outcome<Folder> {
     let folder = Folder::open(path)?;
     match folder.is_empty() {
-        true => Err(format!("--data {}: no pair to learn from", path.display()).into()),
+        true => Err(format!(
+            "--data {}: it has no pair; make a larger data set",
+            path.display()
+        )
+        .into()),
         false => Ok(folder),
     }
 }
@@ -79,7 +96,7 @@ pub(crate) fn check_memory(count: u64, needed: u64) -> Outcome<()> {
     };
     let [needed, free] = [needed, free].map(|bytes| bytes as f64 / (1u64 << 30) as f64);
     Err(format!(
-        "{count} pairs need {needed:.1} GiB of memory, but {free:.1} GiB are free; lower --count, or take a \
+        "{count} pairs need {needed:.1} GiB of memory, but {free:.1} GiB are free; lower --count, or give a \
          smaller --data"
     )
     .into())

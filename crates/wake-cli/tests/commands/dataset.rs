@@ -40,7 +40,7 @@ fn wrong_recipes_shares_and_numbers_are_named() {
             ["\"x\"", "sea.gust_strength", "expected f64"],
         ),
         (["--val-share", "2"], ["val_share", "is 2", "[0, 1]"]),
-        (["--shard", "5/3"], ["--shard", "5/3", "from 0 to n"]),
+        (["--shard", "5/3"], ["--shard", "5/3", "from 0 to N"]),
         (["--shard", "half"], ["--shard", "half", "such as 0/4"]),
         (["--count", "0"], ["--count", "'0'", "1..="]),
         (["--jobs", "0"], ["--jobs", "'0'", "1..="]),
@@ -52,7 +52,7 @@ fn wrong_recipes_shares_and_numbers_are_named() {
     refused_by(
         "dataset",
         &["--merge"],
-        &["shard-0", "missing", "make it too"],
+        &["shard-0", "missing", "make it in the same folder"],
     );
     cannot_write("dataset", &["--count", "1"]);
 }
@@ -277,7 +277,7 @@ fn a_card_and_shards_stand_beside_a_set() {
     refused_into(
         "dataset",
         &again,
-        &["shards", "holds shards already"],
+        &["shards", "already has tar files"],
         &carded,
     );
 }

@@ -463,7 +463,7 @@ fn weights_that_find_nothing_anywhere_are_refused() {
             value.copy_from_slice(&number.to_le_bytes());
         }
         std::fs::write(&weights, bytes).expect("a file");
-        let words = ["weights.safetensors", "plain wake", "train"];
+        let words = ["weights.safetensors", "obvious wake", "train"];
         refused_by(
             "detect",
             &[text(&image), "--weights", text(&weights)],

@@ -130,7 +130,7 @@ fn a_costly_scene_says_so_first() {
     let (code, message) = into("simulate", &arguments, Stdio::null());
     assert_eq!(code, Some(0), "{message}");
     assert!(
-        message.contains("for each pixel of the image") && message.contains("grid.spacing"),
+        message.contains("per pixel of the image") && message.contains("grid.spacing"),
         "{message}"
     );
     let (_, message) = into(

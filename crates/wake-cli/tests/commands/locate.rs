@@ -101,6 +101,6 @@ fn bad_places_and_products_are_named() {
     refused(&[&path, "0,0", "--polarization", "XX"], &["XX", "VV"]);
     refused(&[&path, "0,0", "--polarization", "HH"], &["HH", "VV"]);
     refused(&["no/such.SAFE", "0,0"], &["no/such.SAFE"]);
-    refused(&["README.md", "0,0"], &["README.md", "no product"]);
+    refused(&["README.md", "0,0"], &["README.md", "as a product"]);
     refused(&["crates", "0,0"], &["crates", "annotation"]);
 }

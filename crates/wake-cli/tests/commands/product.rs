@@ -113,7 +113,7 @@ fn a_ship_on_the_map_is_found_on_the_map() {
     refused_into(
         "detect",
         &search,
-        &["is of another search", "remove it"],
+        &["belongs to another search", "remove it"],
         &found,
     );
 }

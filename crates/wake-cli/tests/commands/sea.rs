@@ -48,7 +48,7 @@ fn a_sea_is_learnt_resumed_and_drawn_on() {
     refused_into(
         "train",
         &[&again[..], &SHORT].concat(),
-        &["stage sea has made 2 steps", "resume goes on"],
+        &["stage sea has made 2 steps", "resume this one"],
         &killed,
     );
     let weights = killed.join("sea.safetensors");
@@ -105,7 +105,7 @@ fn what_is_no_sea_is_named() {
     refused_by(
         "train",
         &given(&["--resume"]),
-        &["resume is asked for", "no checkpoint"],
+        &["resume is on", "no checkpoint"],
     );
     refused_by("train", &given(&["--rate=nan"]), &["rate is", "outside"]);
     refused_by("train", &given(&["--spacing=0"]), &["spacing is 0", "0.1"]);

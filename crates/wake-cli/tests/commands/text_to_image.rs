@@ -45,7 +45,7 @@ fn a_model_is_learnt_resumed_and_drawn_with() {
     refused_into(
         "train",
         &common,
-        &["stage autoencoder-kl has made 1 steps", "resume goes on"],
+        &["stage autoencoder-kl has made 1 steps", "resume this one"],
         &killed,
     );
 

@@ -44,7 +44,7 @@ fn wrong_data_devices_and_folders_are_named() {
         refused_by(
             "train wake-model",
             &[stage, "--resume"],
-            &["resume is asked for", "no checkpoint"],
+            &["resume is on", "no checkpoint"],
         );
     }
     let weights = [
@@ -186,7 +186,7 @@ fn a_folder_belongs_to_one_run() {
     let out = toys.path("run");
     toys.refused(
         &["parser", "--steps", "2"],
-        &["stage parser has made 3 steps", "resume goes on"],
+        &["stage parser has made 3 steps", "resume this one"],
     );
     toys.refused(
         &["parser", "--steps", "4", "--resume", "--rate", "1e-2"],
@@ -328,7 +328,7 @@ fn a_damaged_checkpoint_or_image_is_named() {
     std::fs::copy(images.join("000001.png"), images.join("000000.png")).expect("a copy");
     toys.refused(
         &["prior", "--steps", "6", "--resume"],
-        &["000000.png", "damaged or another image"],
+        &["000000.png", "damaged or was replaced"],
     );
 }
 
@@ -367,7 +367,7 @@ fn data_and_numbers_that_do_not_fit_are_refused_by_name() {
     refused_by(
         "train wake-model",
         &arguments,
-        &["grey", "Amplitude", "Decibel"],
+        &["grey", "amplitude", "decibels"],
     );
     for rate in ["nan", "inf", "1e300", "0", "-1"] {
         let rate = format!("--rate={rate}");

@@ -64,14 +64,14 @@ const NEEDS: [(&str, &[&str]); 2] = [
 ];
 /// Keys that cannot be drawn, and why.
 const REFUSED: [(&str, &str); 3] = [
-    ("seed", "no key: every scene has a seed of its own"),
+    ("seed", "no draw: every scene gets its own seed"),
     (
         "grid.rows",
-        "no key: the images of a set have one size, scene.grid.rows",
+        "no draw: all images of a set have the same size; set scene.grid.rows",
     ),
     (
         "grid.columns",
-        "no key: the images of a set have one size, scene.grid.columns",
+        "no draw: all images of a set have the same size; set scene.grid.columns",
     ),
 ];
 
@@ -215,7 +215,7 @@ impl Draws {
                     };
                     return Err(Error::Value(wake_nn::Error::InvalidOption {
                         option: format!("draw.{path}"),
-                        value: format!("{value:?}"),
+                        value: value.to_string(),
                         expected: format!("{kind} from {low} to {high}"),
                     }));
                 }
@@ -245,7 +245,8 @@ fn read(values: &mut Values, key: &str, value: &toml::Value) -> Result<()> {
 
 /// Reads the tables of `together`.
 fn together(value: &toml::Value) -> Result<Vec<(f64, Values)>> {
-    let expected = "tables of keys with their distributions; weight: a number above 0, 1 if absent";
+    let expected =
+        "a list of tables of keys and distributions, each with an optional weight above 0";
     let fail = || refused("together", value, expected);
     let table = |value: &toml::Value| {
         let mut table = value.as_table().ok_or_else(fail)?.clone();
@@ -371,7 +372,9 @@ fn ship(
 fn spacing_of(scene: &Scene, pixels: f64) -> Result<f64> {
     let radar = &scene.radar;
     let range = radar.range_resolution.ok_or_else(|| Error::Recipe {
-        message: format!("draw.{PIXELS} needs radar.range_resolution, or a radar.sensor"),
+        message: format!(
+            "draw.{PIXELS} needs a resolution; set radar.range_resolution or radar.sensor"
+        ),
     })?;
     let cell = (range * radar.azimuth_resolution).sqrt();
     Ok((100.0 * cell / pixels).round().max(10.0) / 100.0)

@@ -33,7 +33,7 @@ pub(super) fn set(table: &mut toml::Table, path: &str, value: toml::Value) -> Re
             .or_insert_with(|| toml::Table::new().into());
         table = entry
             .as_table_mut()
-            .ok_or_else(|| format!("draw.{path}: {name} is no table"))?;
+            .ok_or_else(|| format!("draw.{path}: {name} is not a table"))?;
     }
     table.insert(last.to_owned(), value);
     Ok(())

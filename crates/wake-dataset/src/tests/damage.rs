@@ -48,7 +48,7 @@ fn pipes_are_no_files_of_a_set() {
         };
         let refused = read().unwrap_err().to_string();
         assert!(
-            refused.contains("no regular file") && refused.contains(name),
+            refused.contains("not a regular file") && refused.contains(name),
             "{refused}"
         );
     }
@@ -192,7 +192,7 @@ fn sets_of_earlier_formats_are_refused_in_a_sentence() {
         refused(write(folder.path(), &manifest(), 1, |_| ()), folder.path()),
     ] {
         assert!(
-            told.contains("format 4 is not 5; make the set again"),
+            told.contains("format is 4, expected 5; make the set again"),
             "{told}"
         );
     }

@@ -56,7 +56,7 @@ impl Grid {
         );
         if lines.len() < 2 || pixels.len() < 2 || lines.len() * pixels.len() != points.len() {
             return Err(damaged(format!(
-                "{} grid points on {} lines make no rectangular grid",
+                "its {} grid points on {} lines do not form a rectangular grid",
                 points.len(),
                 lines.len()
             )));
@@ -68,7 +68,7 @@ impl Grid {
             point.line.total_cmp(&at.0).is_ne() || point.pixel.total_cmp(&at.1).is_ne()
         }) {
             return Err(damaged(format!(
-                "the grid point at line {}, pixel {} is not on the pixels of the first grid line",
+                "the grid point at line {}, pixel {} does not match the pixels of the first grid line",
                 point.line, point.pixel
             )));
         }
@@ -345,8 +345,8 @@ mod tests {
                 .expect_err("no grid")
                 .to_string()
         };
-        assert!(refused(&|p| p.clear()).contains("no rectangular grid"));
-        assert!(refused(&|p| p.truncate(34)).contains("no rectangular grid"));
+        assert!(refused(&|p| p.clear()).contains("do not form a rectangular grid"));
+        assert!(refused(&|p| p.truncate(34)).contains("do not form a rectangular grid"));
         assert!(refused(&|p| p[3] = p[4]).contains("grid"));
         assert!(refused(&|p| p[9].pixel = 7.0).contains("pixel 7"));
         assert!(

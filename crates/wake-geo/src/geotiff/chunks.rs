@@ -269,13 +269,13 @@ impl Chunks {
         let damaged = |why: String| {
             Error::damaged(
                 &self.file,
-                format!("strip or tile {index} is no LZW: {why}"),
+                format!("strip or tile {index} is not valid LZW: {why}"),
             )
         };
         let packed = self.byte_counts[index];
         if packed > CHUNK_BYTES as u64 {
             return Err(damaged(format!(
-                "it has {packed} bytes, above {CHUNK_BYTES}"
+                "it has {packed} bytes, above the limit {CHUNK_BYTES}"
             )));
         }
         let mut bytes = vec![0; packed as usize];

@@ -99,8 +99,8 @@ impl Tags {
         );
         if !known {
             return Err(unsupported(format!(
-                "TIFF compression {:?}",
-                self.compression
+                "TIFF compression {}",
+                name(self.compression)
             )));
         }
         // Readers disagree on whether these compressions can have a predictor.
@@ -110,8 +110,8 @@ impl Tags {
         );
         if plain && self.predictor != 1 {
             return Err(unsupported(format!(
-                "a predictor with TIFF compression {:?}",
-                self.compression
+                "a predictor with TIFF compression {}",
+                name(self.compression)
             )));
         }
         let shown = matches!(
@@ -119,7 +119,10 @@ impl Tags {
             PhotometricInterpretation::BlackIsZero | PhotometricInterpretation::RGB
         );
         if !shown {
-            return Err(unsupported(format!("TIFF color {:?}", self.photometric)));
+            return Err(unsupported(format!(
+                "the TIFF photometric interpretation {:?}",
+                self.photometric
+            )));
         }
         let format = self.format.first().map_or(SampleFormat::Uint, |f| {
             SampleFormat::from_u16_exhaustive(*f)
@@ -131,14 +134,20 @@ impl Tags {
             (SampleFormat::Int, 16) => SampleType::I16,
             (SampleFormat::IEEEFP, 32) => SampleType::F32,
             _ => {
+                let kind = match format {
+                    SampleFormat::Uint => "unsigned".to_owned(),
+                    SampleFormat::Int => "signed".to_owned(),
+                    SampleFormat::IEEEFP => "floating-point".to_owned(),
+                    other => format!("format {}", other.to_u16()),
+                };
                 return Err(unsupported(format!(
-                    "a TIFF sample of {bits} bits, {format:?}"
+                    "the TIFF sample type ({bits} bits, {kind})"
                 )));
             }
         };
         if self.bands > MOST_BANDS {
             return Err(unsupported(format!(
-                "a TIFF of {} bands, above {MOST_BANDS},",
+                "a TIFF of {} bands (limit {MOST_BANDS})",
                 self.bands
             )));
         }
@@ -151,6 +160,14 @@ impl Tags {
             bands,
             big_endian: self.big_endian,
         })
+    }
+}
+
+/// Name of a compression; its number if it has none.
+fn name(compression: CompressionMethod) -> String {
+    match compression {
+        CompressionMethod::Unknown(number) => number.to_string(),
+        known => format!("{known:?}"),
     }
 }
 
@@ -189,6 +206,9 @@ pub(super) fn failed(file: &str, error: &TiffError) -> Error {
             what: sentence(&format!("a feature of this TIFF ({what})")),
             remedy: CONVERT,
         },
-        other => Error::damaged(file, sentence(&format!("no readable TIFF ({other})"))),
+        other => Error::damaged(
+            file,
+            sentence(&format!("it is not a readable TIFF file ({other})")),
+        ),
     }
 }

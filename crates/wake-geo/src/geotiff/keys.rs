@@ -59,9 +59,9 @@ fn read(file: &str, chunks: &Chunks) -> Result<Geolocation, String> {
     let points = doubles(chunks, TIEPOINTS)?.unwrap_or_default();
     let (points, _) = points.as_chunks::<6>();
     let points = points.iter().map(|&[pixel, line, _, x, y, height]| {
-        let (latitude, longitude) = projection
-            .to_degrees(x, y)
-            .ok_or_else(|| format!("a control point at {x}, {y} lies beyond EPSG:{code}"))?;
+        let (latitude, longitude) = projection.to_degrees(x, y).ok_or_else(|| {
+            format!("a control point at {x}, {y} lies outside the projection EPSG:{code}")
+        })?;
         Ok(GridPoint {
             line: line - half,
             pixel: pixel - half,
@@ -76,7 +76,8 @@ fn read(file: &str, chunks: &Chunks) -> Result<Geolocation, String> {
     });
     let points: Vec<GridPoint> = points.collect::<Result<_, String>>()?;
     let grid = Grid::new(file, points, (chunks.lines, chunks.pixels));
-    let grid = grid.map_err(|_| "its control points make no rectangular grid over the image")?;
+    let grid =
+        grid.map_err(|_| "its control points do not form a rectangular grid over the image")?;
     Ok(Geolocation::Grid(grid))
 }
 

@@ -55,8 +55,8 @@ pub(super) fn decode(
         }
         other => {
             return Err(format!(
-                "predictor {other} of {:?} is unknown",
-                stored.sample
+                "predictor {other} is not supported for {} samples",
+                stored.sample.name()
             ));
         }
     };

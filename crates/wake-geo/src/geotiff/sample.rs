@@ -22,6 +22,16 @@ impl SampleType {
             Self::F32 => 4,
         }
     }
+
+    /// Name in messages.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::U8 => "8-bit unsigned",
+            Self::U16 => "16-bit unsigned",
+            Self::I16 => "16-bit signed",
+            Self::F32 => "32-bit floating-point",
+        }
+    }
 }
 
 /// Encoding of pixels in a file.

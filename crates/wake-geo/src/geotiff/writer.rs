@@ -144,7 +144,7 @@ fn check(path: &Path, layout: &GeoTiffLayout) -> Result<()> {
         || layout.lines as u64 * layout.pixels as u64 > IMAGE_PIXELS
     {
         format!(
-            "{} lines of {} pixels are above the limit of {IMAGE_SIDE} a side and {IMAGE_PIXELS} in all; write less",
+            "{} lines of {} pixels exceed the limit of {IMAGE_SIDE} per side and {IMAGE_PIXELS} in total; write a smaller image",
             layout.lines, layout.pixels
         )
     } else if points > GRID_POINTS {

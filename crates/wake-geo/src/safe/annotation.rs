@@ -200,7 +200,7 @@ fn pass(text: &str) -> Option<Pass> {
 /// Value of a child element, converted from its text by `read`.
 fn named<T>(node: Node<'_>, name: &str, read: impl Fn(&str) -> Option<T>) -> Result<T> {
     let text = node.get(name)?.text();
-    read(text).ok_or_else(|| node.error(format!("{name} is {text:?}, which has no meaning")))
+    read(text).ok_or_else(|| node.error(format!("{name} is {text:?}, which is not a valid value")))
 }
 
 fn read_looks(processing: Node<'_>) -> Result<Vec<SwathLooks>> {

@@ -149,7 +149,7 @@ impl Archive {
         String::from_utf8(bytes).map_err(|e| {
             Error::damaged(
                 name,
-                format!("byte {} is no UTF-8", e.utf8_error().valid_up_to()),
+                format!("byte {} is not UTF-8", e.utf8_error().valid_up_to()),
             )
         })
     }
@@ -183,7 +183,7 @@ impl Archive {
         if written != size {
             return Err(Error::damaged(
                 name,
-                format!("it unpacks to other than its declared {size} bytes"),
+                format!("it does not unpack to its declared {size} bytes"),
             ));
         }
         Ok(Arc::new(file))
@@ -193,7 +193,7 @@ impl Archive {
 fn zip_at(path: &Path) -> Result<ZipArchive<File>> {
     let file = whole_files::open_regular(path).map_err(|e| Error::io(path, e))?;
     ZipArchive::new(file)
-        .map_err(|e| Error::unreadable(path, format!("no readable zip archive: {e}")))
+        .map_err(|e| Error::unreadable(path, format!("it is not a readable zip archive: {e}")))
 }
 
 fn check_count(path: &Path, count: usize) -> Result<()> {

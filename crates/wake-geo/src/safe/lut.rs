@@ -86,7 +86,7 @@ impl Lut {
             let vector = read_vector(node, values, extent)?;
             if vectors.last().is_some_and(|last| last.line >= vector.line) {
                 return Err(node.error(format!(
-                    "line {} of a {item} does not lie after the line before",
+                    "line {} of a {item} does not come after the previous line",
                     vector.line
                 )));
             }
@@ -167,7 +167,7 @@ fn read_vector(node: Node<'_>, values: &str, extent: Extent) -> Result<Vector> {
     let allowed = extent.smallest..=extent.largest;
     if let Some(value) = table.iter().find(|value| !allowed.contains(value)) {
         return Err(node.error(format!(
-            "a {values} of line {line} is {value}, outside [{}, {}]",
+            "a value of {values} in line {line} is {value}, outside [{}, {}]",
             extent.smallest, extent.largest
         )));
     }

@@ -197,10 +197,11 @@ impl Sentinel1 {
             return Err(Error::damaged(
                 &name,
                 format!(
-                    "it has {} lines of {} pixels of {:?}, but the annotation says {lines} lines of {pixels} pixels of U16",
+                    "it has {} lines of {} pixels with {} samples, but the annotation says {lines} lines of {pixels} pixels, and samples \
+                     must be 16-bit unsigned",
                     tiff.lines(),
                     tiff.pixels(),
-                    tiff.sample_type()
+                    tiff.sample_type().name()
                 ),
             ));
         }

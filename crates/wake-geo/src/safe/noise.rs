@@ -144,7 +144,7 @@ fn read_block(node: Node<'_>, lines: usize, pixels: usize) -> Result<AzimuthBloc
     };
     if block.first_line > block.last_line || block.first_pixel > block.last_pixel {
         return Err(node.error(format!(
-            "an azimuth block of noise reaches from line {} to {} and from pixel {} to {}",
+            "an azimuth block of noise is empty: it reaches from line {} to {} and from pixel {} to {}",
             block.first_line, block.last_line, block.first_pixel, block.last_pixel
         )));
     }

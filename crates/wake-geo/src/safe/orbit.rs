@@ -24,11 +24,11 @@ impl Orbit {
             }
             let text = node.get("time")?.text();
             let time = UtcTime::parse(text)
-                .ok_or_else(|| node.error(format!("the time of an orbit state is {text:?}")))?;
+                .ok_or_else(|| node.error(format!("orbit state time is {text:?}, expected UTC")))?;
             let frame = node.find("frame").map_or("", Node::text);
             if !matches!(frame, "" | "Earth Fixed") {
                 return Err(node.error(format!(
-                    "the frame of an orbit state is {frame:?}, not \"Earth Fixed\""
+                    "the frame of an orbit state is {frame:?}, expected \"Earth Fixed\""
                 )));
             }
             let squares = ["velocity/x", "velocity/y", "velocity/z"]

@@ -284,7 +284,7 @@ impl ClipText {
         let longest = self.config.max_tokens;
         assert!(
             tokens <= longest,
-            "{tokens} tokens, this text encoder takes at most {longest}"
+            "the prompt has {tokens} tokens, expected at most {longest}"
         );
         let positions = self.position_embedding.weight.val().narrow(0, 0, tokens);
         self.token_embedding.forward(ids) + positions.unsqueeze::<3>()

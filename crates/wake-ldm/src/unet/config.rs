@@ -195,7 +195,15 @@ impl UNetConfig {
                 divides("attention_head_dim", heads, width)?;
             }
         }
-        divides("sinusoidal embedding", 2, self.block_out_channels[0])
+        let width = self.block_out_channels[0];
+        if width.is_multiple_of(2) {
+            return Ok(());
+        }
+        Err(Error::InvalidOption {
+            option: "first width of block_out_channels".to_owned(),
+            value: width.to_string(),
+            expected: "an even number".to_owned(),
+        })
     }
 
     fn validate_numbers(&self) -> Result<()> {

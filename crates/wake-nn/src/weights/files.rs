@@ -169,7 +169,7 @@ impl WeightFiles {
                 if tensors.insert(name.clone(), stored).is_some() {
                     return Err(Error::InvalidSafetensors {
                         path: file.path.clone(),
-                        reason: format!("two tensors are called {name}").into(),
+                        reason: format!("two tensors have the name {name}").into(),
                     });
                 }
             }
@@ -185,7 +185,7 @@ impl WeightFile {
         if !found.is_file() {
             return Err(Error::InvalidSafetensors {
                 path: path.to_owned(),
-                reason: "no regular file".into(),
+                reason: "not a regular file".into(),
             });
         }
         let file = File::open(path).map_err(|source| failed("read", path, source))?;

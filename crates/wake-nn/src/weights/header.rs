@@ -39,13 +39,18 @@ pub(super) fn read(path: &Path, mut file: impl Read, size: u64) -> Result<Header
         reason,
     };
     let Some(rest) = size.checked_sub(LENGTH) else {
-        return Err(invalid("too short for a header".into()));
+        return Err(invalid(
+            format!("it has {size} bytes, expected at least {LENGTH}").into(),
+        ));
     };
     let mut length = [0; LENGTH as usize];
     file.read_exact(&mut length).map_err(io)?;
     let length = u64::from_le_bytes(length);
     if length > rest.min(LONGEST) {
-        return Err(invalid(format!("a header of {length} bytes").into()));
+        let most = rest.min(LONGEST);
+        return Err(invalid(
+            format!("its header has {length} bytes, expected at most {most}").into(),
+        ));
     }
     let mut text = vec![0; length as usize];
     file.read_exact(&mut text).map_err(io)?;
@@ -54,7 +59,7 @@ pub(super) fn read(path: &Path, mut file: impl Read, size: u64) -> Result<Header
     if metadata.data_len() as u64 != found {
         let told = metadata.data_len();
         return Err(invalid(
-            format!("{told} bytes of data, but {found} are there").into(),
+            format!("its header describes {told} bytes of data, but it has {found}").into(),
         ));
     }
     Ok(Header {

@@ -28,12 +28,12 @@ impl ShardIndex {
             shards: BTreeMap::new(),
         };
         let map = json["weight_map"].as_object();
-        for (tensor, shard) in map.ok_or_else(|| index.invalid("no weight_map"))? {
+        for (tensor, shard) in map.ok_or_else(|| index.invalid("weight_map is missing"))? {
             let Some(shard) = shard.as_str() else {
-                return Err(index.invalid("weight_map holds other than names"));
+                return Err(index.invalid("a value of weight_map is not a file name"));
             };
             if Path::new(shard).file_name() != Some(shard.as_ref()) {
-                return Err(index.invalid("a shard lies outside the folder"));
+                return Err(index.invalid(&format!("shard {shard} lies outside the folder")));
             }
             let tensors = index.shards.entry(shard.to_owned()).or_default();
             tensors.insert(tensor.clone());

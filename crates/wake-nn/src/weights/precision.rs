@@ -43,7 +43,7 @@ impl Precision {
         {
             None => Ok(()),
             Some(device) => Err(Error::UnsupportedPrecision {
-                device: format!("{device:?}"),
+                device: crate::device_label(device),
                 precision: self.name(),
             }),
         }

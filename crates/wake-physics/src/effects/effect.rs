@@ -66,6 +66,6 @@ impl Site<'_> {
 }
 
 /// Reason given for an effect that the scene does not ask for.
-pub(super) const NOT_ASKED_FOR: &str = "not asked for";
+pub(super) const NOT_ASKED_FOR: &str = "not requested";
 /// Reason given for an effect that does not reach the image.
 pub(super) const OUTSIDE: &str = "it does not reach the image";

@@ -26,7 +26,7 @@ impl SlickBands {
             absent: match sea.slick_damping > 0.0 {
                 false => Some(NOT_ASKED_FOR),
                 true if sea.wind_speed <= STRONGEST_WIND => None,
-                true => Some("the wind tears films apart"),
+                true => Some("the wind breaks up slicks"),
             },
         }
     }

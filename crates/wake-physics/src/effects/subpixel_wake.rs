@@ -181,9 +181,7 @@ impl Effect for SubpixelWakes {
         Weight {
             absent: match strength {
                 _ if !self.counted => Some(NOT_ASKED_FOR),
-                _ if self.waves.iter().all(Option::is_none) => {
-                    Some("there is no ship, or no such wave of one")
-                }
+                _ if self.waves.iter().all(Option::is_none) => Some("no ship has subpixel waves"),
                 [0.0, _] => Some(OUTSIDE),
                 _ => None,
             },

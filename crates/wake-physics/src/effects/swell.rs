@@ -29,7 +29,7 @@ impl Effect for SwellWaves {
         Weight {
             absent: match self.swell {
                 None => Some(NOT_ASKED_FOR),
-                Some(_) if amplitudes.swell.is_empty() => Some("no swell that a pixel carries"),
+                Some(_) if amplitudes.swell.is_empty() => Some("pixels resolve no swell"),
                 Some(_) => None,
             },
             estimate: amplitudes.waves(&amplitudes.swell),

@@ -104,8 +104,9 @@ impl Likelihood {
             return Err(Error::Conflict {
                 name: "radar.range_resolution".to_owned(),
                 value: resolution.to_string(),
-                requirement: "but the law's own images have independent pixels: remove it"
-                    .to_owned(),
+                requirement:
+                    "but images drawn from the likelihood have independent pixels: remove it"
+                        .to_owned(),
             });
         }
         let mut image = self.expected.intensity.clone();
@@ -143,8 +144,9 @@ impl Likelihood {
             return conflict("image", value, &requirement);
         }
         if !image.values.iter().all(|v| v.is_finite() && *v >= 0.0) {
-            let requirement = "but intensities are finite and not negative";
-            return conflict("image", "not an intensity".to_owned(), requirement);
+            let value = "negative or not finite in some pixels".to_owned();
+            let requirement = "but intensities must be finite and at least 0";
+            return conflict("image", value, requirement);
         }
         let Factors { gain, texture } = *factors;
         if !(gain.is_finite() && gain > 0.0 && texture.is_finite() && texture >= 0.0) {
@@ -152,7 +154,7 @@ impl Likelihood {
             return conflict(
                 "factors",
                 value,
-                "but a gain is positive and a texture not negative",
+                "but gain must be above 0, texture at least 0, and both finite",
             );
         }
         let observed = Observed::new(image.clone(), &self.scene, |_, _| 1.0);

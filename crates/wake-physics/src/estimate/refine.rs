@@ -113,12 +113,17 @@ pub(super) fn check(image: &Field, guess: &Scene) -> Result<()> {
         return conflict("image", value, requirement);
     }
     if !image.values.iter().all(|v| v.is_finite() && *v >= 0.0) {
-        let requirement = "but intensities are finite and not negative".to_owned();
-        return conflict("image", "not an intensity".to_owned(), requirement);
+        let value = "negative or not finite in some pixels".to_owned();
+        let requirement = "but intensities must be finite and at least 0".to_owned();
+        return conflict("image", value, requirement);
     }
     if guess.ships.len() != 1 {
-        let requirement = "but the guess has one ship".to_owned();
-        return conflict("ship", format!("{} ships", guess.ships.len()), requirement);
+        let requirement = "but an estimate needs a scene with one ship".to_owned();
+        return conflict(
+            "number of ships",
+            guess.ships.len().to_string(),
+            requirement,
+        );
     }
     Ok(())
 }

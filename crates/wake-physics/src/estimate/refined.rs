@@ -89,9 +89,9 @@ const DOUBT: f64 = 0.05;
 
 pub(super) fn no_start() -> Error {
     Error::Conflict {
-        name: "ship".to_owned(),
-        value: "no start".to_owned(),
-        requirement: "but an estimate begins at one".to_owned(),
+        name: "list of starts".to_owned(),
+        value: "empty".to_owned(),
+        requirement: "but an estimate needs at least one start with a ship".to_owned(),
     }
 }
 

@@ -50,8 +50,11 @@ impl Sighting {
         }
         Err(Error::Conflict {
             name: "sighting".to_owned(),
-            value: format!("{self:?}"),
-            requirement: "but its numbers are finite and its deviations above 0".to_owned(),
+            value: format!(
+                "{x}, {y} m ± {} m, heading {} ± {} degrees",
+                self.place_sd, self.heading, self.heading_sd
+            ),
+            requirement: "but all numbers must be finite and deviations above 0".to_owned(),
         })
     }
 }

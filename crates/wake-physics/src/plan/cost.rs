@@ -47,8 +47,7 @@ impl fmt::Display for Cost {
         let [rows, columns] = self.computed;
         write!(
             f,
-            "{rows} x {columns} pixels are computed, {:.1} for each pixel of the image: some {:.0} s of a core and up to {:.1} \
-             GiB; {}",
+            "{rows} x {columns} pixels are computed, {:.1} per pixel of the image: about {:.0} core-seconds and up to {:.1} GiB; {}",
             self.for_each,
             self.core_seconds,
             self.bytes as f64 / (1u64 << 30) as f64,
@@ -78,7 +77,7 @@ mod tests {
         let [rows, columns] = far.computed;
         assert!((far.for_each - (rows * columns) as f64 / 97.0).abs() < 1e-6);
         let text = far.to_string();
-        for word in ["radar.range_to_velocity", "of a core", &rows.to_string()] {
+        for word in ["radar.range_to_velocity", "core-seconds", &rows.to_string()] {
             assert!(text.contains(word), "{text}");
         }
         assert!(!cost(&[]).is_high());

@@ -74,16 +74,16 @@ fn absent(term: Term, models: &Models, amplitudes: &Amplitudes<'_>) -> Option<&'
     match term {
         Term::Sea => {
             let none = first.open.no_wind_waves();
-            none.then_some("no wind wave that a pixel carries")
+            none.then_some("pixels resolve no wind waves")
         }
         Term::Kelvin => {
             let unseen = first.wake.is_empty();
-            let unseen = unseen.then_some("no wave that a pixel carries reaches the image");
+            let unseen = unseen.then_some("no resolved wave reaches the image");
             models.no_wake().or(unseen)
         }
         Term::TiltAverage => {
             let none = models.subpixel_slopes() == SlopeCovariance::NONE;
-            bragg.or(none.then_some("no wave between pixel and Bragg waves"))
+            bragg.or(none.then_some("no waves between pixel spacing and Bragg waves"))
         }
         Term::RangeBunching => flat,
         Term::Hydrodynamic => flat.or(bragg),
@@ -101,7 +101,7 @@ fn response(scene: &Scene, models: &Models, contrast: f64) -> Weight {
     Weight {
         absent: match (&models.response, scene.radar.range_resolution) {
             (Some(_), _) => None,
-            (None, None) => Some("not asked for"),
+            (None, None) => Some("not requested"),
             (None, Some(_)) => Some("not in model.terms"),
         },
         estimate: contrast.max(correlation),
@@ -357,7 +357,7 @@ mod tests {
                 Term::Noise,
                 Term::ImpulseResponse,
             ];
-            let reason = optional.contains(&term).then_some("not asked for");
+            let reason = optional.contains(&term).then_some("not requested");
             assert_eq!(weight.absent, reason, "{term:?}");
         }
     }

@@ -18,8 +18,8 @@ pub(super) fn notes(prepared: &Prepared<'_>) -> Vec<String> {
     }
     if let Some(asked) = models.pixels.asked_spacing {
         notes.push(format!(
-            "waves on the arms of a wake ask for pixels of {asked:.2} m; {} m are computed: shorter waves count by the \
-             variances of their slopes and velocities where an impulse response is asked for, else not",
+            "waves on the arms of a wake need pixels of {asked:.2} m, but {} m are computed: shorter waves count only by the \
+             variances of their slopes and velocities, and only with an impulse response",
             models.pixels.computed.spacing
         ));
     }
@@ -28,8 +28,8 @@ pub(super) fn notes(prepared: &Prepared<'_>) -> Vec<String> {
     if let Some(response) = models.response.filter(|_| divisions > COARSE_PIXEL) {
         let [range, azimuth] = [response.range, response.azimuth].map(|axis| axis.resolution);
         notes.push(format!(
-            "a pixel of {spacing} m takes {divisions} x {divisions} computed ones, for the radar resolves {range:.1} x {azimuth:.1} m: for an image \
-             averaged to such pixels set radar.range_resolution and radar.azimuth_resolution to what that image resolves"
+            "a pixel of {spacing} m needs {divisions} x {divisions} computed pixels, because the radar resolves {range:.1} x {azimuth:.1} m; for an image \
+             averaged to such pixels, set radar.range_resolution and radar.azimuth_resolution to the resolution of that image"
         ));
     }
     let count = models.wakes.len();
@@ -37,7 +37,7 @@ pub(super) fn notes(prepared: &Prepared<'_>) -> Vec<String> {
         let wavelength = wake.transverse_wavelength();
         if wake.speed > 0.0 && 2.0 * models.pixels.computed.spacing > wavelength {
             notes.push(format!(
-                "the transverse waves of the {} are {wavelength:.2} m long: a pixel of {} m carries none of them",
+                "the transverse waves of the {} are {wavelength:.2} m long, too short for pixels of {} m",
                 Scene::ship_name(n, count),
                 models.pixels.computed.spacing
             ));

@@ -89,13 +89,12 @@ pub(crate) fn choose(effects: &[Weighed], terms: &Terms, tolerance: f64) -> Vec<
 fn planned(effect: &Weighed, terms: &Terms, below_budget: bool) -> PlannedTerm {
     let (used, why) = match (effect.weight.absent, terms) {
         (Some(reason), _) => (false, reason.to_owned()),
-        (None, Terms::List(list)) if list.contains(&effect.term) => (true, "asked for".to_owned()),
+        (None, Terms::List(list)) if list.contains(&effect.term) => (true, "requested".to_owned()),
         (None, Terms::List(_)) => (false, "not in model.terms".to_owned()),
-        (None, Terms::Rule(TermRule::All)) => (true, "all terms asked for".to_owned()),
-        (None, Terms::Rule(TermRule::Needed)) if below_budget => (
-            false,
-            "changes less than the tolerance leaves room for".to_owned(),
-        ),
+        (None, Terms::Rule(TermRule::All)) => (true, "all terms requested".to_owned()),
+        (None, Terms::Rule(TermRule::Needed)) if below_budget => {
+            (false, "changes less than the tolerance allows".to_owned())
+        }
         (None, Terms::Rule(TermRule::Needed)) => {
             (true, "may change more than the tolerance".to_owned())
         }

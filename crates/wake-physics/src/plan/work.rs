@@ -40,7 +40,7 @@ impl Advice {
                 "lower grid.rows, grid.columns, grid.oversampling or radar.range_to_velocity, or raise grid.spacing"
             }
             Self::Turn => {
-                "set ship.turn_rate to 0 or farther from it, for most is for the waves of a wide turn, or raise grid.spacing"
+                "set ship.turn_rate to 0 or farther from 0, because the waves of a wide turn cost most, or raise grid.spacing"
             }
             Self::Looks => "lower radar.looks or grid.oversampling",
             Self::Tolerance => "raise model.tolerance",

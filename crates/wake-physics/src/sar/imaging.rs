@@ -73,7 +73,7 @@ impl Response {
     pub(super) fn new(imaging: &Imaging, sources: &Raster, image: &Raster) -> Self {
         assert!(
             (sources.spacing - image.spacing).abs() <= 1e-9 * image.spacing,
-            "sources and image of different spacing"
+            "sources and image differ in spacing"
         );
         let h = image.spacing;
         let resolution = &imaging.resolution;
@@ -115,7 +115,7 @@ impl Sources<'_> {
             assert_eq!(
                 (field.rows, field.columns, field.values.len()),
                 (self.raster.rows, self.raster.columns, self.raster.len()),
-                "a field of another size than its raster"
+                "a field and its raster differ in size"
             );
         }
     }

@@ -5,9 +5,9 @@
 //! S = F⁻¹[F[E] W_x(f_x) W_y(f_y)] / √mean(W²)  single-look complex image
 //! ⟨|S|²⟩ = I ⊛ |h|² / ∫|h|²                    its intensity, in the unit of I
 //! ```
+//!
 //! Sea, noise and ships pass through the same filter. A point of cross section σ is √σ/Δ in one cell of E, with Δ the
 //! spacing; its image integrates to σ.
-//! its image integrates to σ.
 
 use crate::fft::{self, Filtered, LowPass};
 use crate::numeric::vector::{cos_sin, ln_f32, vectorized};
@@ -247,12 +247,12 @@ impl View {
         assert_eq!(
             (sources.intensity.rows, sources.intensity.columns),
             (raster.rows, raster.columns),
-            "an intensity of another size than its raster"
+            "the intensity and its raster differ in size"
         );
         let step = (image.spacing / raster.spacing).round();
         assert!(
             step >= 1.0 && (step * raster.spacing - image.spacing).abs() <= 1e-9 * image.spacing,
-            "an image spacing of {} m on sources of {} m",
+            "image spacing is {} m, expected a multiple of the sources' spacing of {} m",
             image.spacing,
             raster.spacing
         );
@@ -267,7 +267,7 @@ impl View {
         };
         assert!(
             inside(0, raster.rows) && inside(1, raster.columns),
-            "an image that leaves its sources"
+            "the image reaches beyond its sources"
         );
         Self {
             sizes: LowPass::sizes([raster.rows, raster.columns], step),

@@ -90,9 +90,9 @@ impl Ship {
         let degrees = |radius: f64| (self.speed / radius).to_degrees();
         Err(Error::Conflict {
             name: format!("{name}.turn_rate"),
-            value: format!("{} degrees a second", self.turn_rate),
+            value: format!("{} degrees per second", self.turn_rate),
             requirement: format!(
-                "but a ship of {} m and {} m/s turns by {:.2e} to {:.3} degrees a second, on a radius of {} km to {smallest:.0} m; 0 is straight on",
+                "but a ship of {} m at {} m/s can turn by {:.2e} to {:.3} degrees per second, on a radius of {} km to {smallest:.0} m; use 0 for a straight track",
                 self.length,
                 self.speed,
                 degrees(WIDEST_TURN),
@@ -160,7 +160,7 @@ impl Ship {
             "turn_rate",
             self.turn_rate,
             [-10.0, 10.0],
-            "degrees a second",
+            "degrees per second",
         )?;
         self.validate_turn(name)?;
         number("position[0]", self.position[0], "m")?;
@@ -290,7 +290,7 @@ impl Radar {
         if self.prf.is_some() && self.azimuth_ambiguity.is_none() {
             return refuse(
                 "radar.prf",
-                "but places ambiguities only: set radar.azimuth_ambiguity too, or leave it out",
+                "but only affects ambiguities: set radar.azimuth_ambiguity too, or leave radar.prf out",
             );
         }
         Ok(())

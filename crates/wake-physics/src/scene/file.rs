@@ -102,7 +102,7 @@ impl Scene {
                 .or_insert_with(|| toml::Table::new().into());
             table = entry
                 .as_table_mut()
-                .ok_or_else(|| fail(format!("{name} is no table")))?;
+                .ok_or_else(|| fail(format!("{name} is not a table")))?;
         }
         table.insert((*last).to_owned(), value);
         root.try_into()
@@ -122,28 +122,28 @@ fn table_of_ship<'t, 'k>(
     if entry.is_table() {
         *entry = toml::Value::Array(vec![entry.clone()]);
     }
-    let ships = entry.as_array_mut().ok_or("ship is no table")?;
+    let ships = entry.as_array_mut().ok_or("ship is not a table")?;
     let count = ships.len();
     let number = keys.first().and_then(|key| key.parse::<usize>().ok());
     let (at, rest) = match number {
         Some(number @ 1..) if number <= count + 1 => (number - 1, &keys[1..]),
         Some(_) => {
             return Err(format!(
-                "of {count} ships the first is ship.1, and ship.{} is one more",
+                "the scene has {count} ships: the first is ship.1, and ship.{} adds another",
                 count + 1
             ));
         }
         None if count <= 1 => (0, keys),
         None => {
             return Err(format!(
-                "there are {count} ships: name one, the first is ship.1"
+                "the scene has {count} ships: name one, the first is ship.1"
             ));
         }
     };
     if at == count {
         ships.push(toml::Table::new().into());
     }
-    let table = ships[at].as_table_mut().ok_or("a ship is no table")?;
+    let table = ships[at].as_table_mut().ok_or("the ship is not a table")?;
     Ok((table, rest))
 }
 
@@ -181,7 +181,9 @@ fn text_of(path: &Path) -> std::io::Result<String> {
     let file = std::fs::File::open(path)?;
     file.take(LONGEST + 1).read_to_string(&mut text)?;
     if text.len() as u64 > LONGEST {
-        return Err(std::io::Error::other("longer than 1 MiB, so no scene"));
+        return Err(std::io::Error::other(
+            "the file is longer than 1 MiB, the limit for a scene",
+        ));
     }
     Ok(text)
 }
@@ -321,7 +323,7 @@ mod tests {
             .unwrap();
         for (assignment, words) in [
             ("ship.speed=3", "2 ships: name one, the first is ship.1"),
-            ("ship.4.speed=3", "ship.3 is one more"),
+            ("ship.4.speed=3", "ship.3 adds another"),
             ("ship.0.speed=3", "the first is ship.1"),
             ("ship.2.speed=50", "ship.2.speed is 50"),
             ("ship.2.beam=300", "ship.2.beam is 300"),

@@ -9,7 +9,10 @@ pub(super) mod depth {
     use super::{Deserialize, Deserializer, Serializer};
 
     #[derive(Deserialize)]
-    #[serde(untagged, expecting = "a depth in metres, inf or \"infinite\"")]
+    #[serde(
+        untagged,
+        expecting = "expected a depth in metres, inf or \"infinite\""
+    )]
     enum Depth {
         Metres(f64),
         Word(Word),
@@ -47,7 +50,10 @@ pub(super) mod seed {
     use super::{Deserialize, Deserializer, Serializer};
 
     #[derive(Deserialize)]
-    #[serde(untagged, expecting = "a whole number from 0 to 18446744073709551615")]
+    #[serde(
+        untagged,
+        expecting = "expected a whole number from 0 to 18446744073709551615"
+    )]
     enum Seed {
         Number(u64),
         Digits(String),
@@ -71,7 +77,7 @@ pub(super) mod seed {
             Seed::Number(seed) => Ok(seed),
             Seed::Digits(digits) => digits.parse().map_err(|_| {
                 D::Error::custom(format!(
-                    "{} is no whole number from 0 to {}",
+                    "'{}' is not a whole number from 0 to {}",
                     whole_files::quoted(&digits),
                     u64::MAX
                 ))

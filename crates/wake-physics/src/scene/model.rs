@@ -37,7 +37,7 @@ impl Terms {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(
     untagged,
-    expecting = "\"needed\", \"all\" or a list of the terms sea, swell, kelvin, subpixel_wake, turbulent, bright_edge, slicks, tilt_average, specular, breaking, gusts, range_bunching, hydrodynamic, velocity_bunching, azimuth_smear, noise, impulse_response, speckle"
+    expecting = "expected \"needed\", \"all\" or a list of the terms sea, swell, kelvin, subpixel_wake, turbulent, bright_edge, slicks, tilt_average, specular, breaking, gusts, range_bunching, hydrodynamic, velocity_bunching, azimuth_smear, noise, impulse_response, speckle"
 )]
 pub enum Terms {
     /// By a rule.

@@ -62,8 +62,8 @@ pub fn direct_intensity(scene: &Scene, pixels: &[[usize; 2]]) -> Result<DirectPi
     if models.response.is_some() {
         return Err(Error::Conflict {
             name: "radar".to_owned(),
-            value: "with an impulse response".to_owned(),
-            requirement: "so that no pixel can be had alone; simulate the whole scene with Method::Direct, or take the response away".to_owned(),
+            value: "one with an impulse response".to_owned(),
+            requirement: "so no pixel can be computed alone; simulate the whole scene with Method::Direct, or remove radar.range_resolution".to_owned(),
         });
     }
     let plan = Plan::of(&prepared)?;

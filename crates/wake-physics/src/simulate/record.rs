@@ -131,7 +131,7 @@ impl Accuracy {
         .filter_map(|(what, reached)| {
             let Reached { asked, reached } = reached.filter(|r| !r.met())?;
             Some(format!(
-                "{what} reached an error of {reached:.1e} where {asked:.1e} was asked for"
+                "the error of {what} is {reached:.1e}, but {asked:.1e} was requested"
             ))
         })
         .collect()

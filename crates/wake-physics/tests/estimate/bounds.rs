@@ -72,7 +72,7 @@ fn what_is_no_image_of_the_grid_is_refused() {
     assert!(likelihood.of(&image, &factors).is_err());
     image.values[5] = f32::NAN;
     let error = likelihood.of(&image, &Factors::default()).unwrap_err();
-    assert!(error.to_string().contains("not an intensity"), "{error}");
+    assert!(error.to_string().contains("not finite"), "{error}");
     image.rows = 5;
     let error = likelihood.of(&image, &Factors::default()).unwrap_err();
     assert!(error.to_string().contains("96 x 96"), "{error}");

@@ -154,7 +154,7 @@ fn the_response_smears_and_keeps_the_mean() {
 fn nothing_of_it_is_on_by_default() {
     let plan = simulate(&small(64, 64, &[])).unwrap().plan;
     for planned in plan.terms.iter().filter(|t| EXTRAS.contains(&t.term)) {
-        assert!(!planned.used && planned.why == "not asked for", "{plan}");
+        assert!(!planned.used && planned.why == "not requested", "{plan}");
         assert_eq!(planned.estimate, 0.0);
     }
 }

@@ -48,7 +48,7 @@ def text(name: str, value: Any) -> str:
     try:
         value.encode()
     except UnicodeEncodeError as error:
-        raise OptionError(f"{name} holds half a character: {error.reason}") from None
+        raise OptionError(f"{name} is not valid Unicode: {error.reason}") from None
     return value
 
 
@@ -60,7 +60,7 @@ def path(name: str, value: Any) -> str:
         raise OptionError(f"{name} is {value!r:.80}, expected a path") from None
     found = os.fsdecode(found)
     if not found or "\0" in found:
-        raise OptionError(f"{name} is {found!r:.80}, which no file can be named")
+        raise OptionError(f"{name} is {found!r:.80}, expected a path without null characters")
     return found
 
 
@@ -69,7 +69,7 @@ def array(name: str, value: Any, dimensions: int, dtype: npt.DTypeLike) -> npt.N
     try:
         found = np.asarray(value)
     except (TypeError, ValueError) as error:
-        raise ArrayError(f"{name} is no array: {error}") from None
+        raise ArrayError(f"{name} is not an array: {error}") from None
     if found.dtype.kind not in "buif":
         raise ArrayError(f"{name} is an array of {found.dtype}, expected real numbers")
     if found.ndim != dimensions:

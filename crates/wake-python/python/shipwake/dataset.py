@@ -284,7 +284,7 @@ class Dataset:
     def _position(self, index: int) -> int:
         position = operator.index(index)
         if not -self._count <= position < self._count:
-            raise IndexError(f"image {position} of {self._count}")
+            raise IndexError(f"image {position} is outside the data set of {self._count} images")
         return position % self._count
 
     def _pool(self) -> int | None:
@@ -366,7 +366,7 @@ def _read(path: str) -> str:
     except (OSError, UnicodeDecodeError) as error:
         raise FileError(f"cannot read {path}: {error}") from error
     if len(text) > _LONGEST_RECIPE:
-        raise FileError(f"cannot read {path}: longer than 1 MiB, so no recipe")
+        raise FileError(f"cannot read {path}: it is longer than 1 MiB, the limit for a recipe")
     return text
 
 

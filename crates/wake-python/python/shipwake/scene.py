@@ -193,7 +193,7 @@ class Scene:
         return copy.deepcopy(found)
 
     def __iter__(self) -> Iterator[str]:
-        raise TypeError("a scene is no sequence; use to_dict()")
+        raise TypeError("a Scene cannot be iterated; use to_dict()")
 
     def labels(self) -> Labels:
         """Returns the labels of the image without simulating it."""

@@ -37,7 +37,7 @@ impl TrainingData {
         let positions = folder.trainset();
         let most = folder.len() as f64;
         wake_nn::check_range(
-            "training pairs of the data set",
+            "number of training pairs of the data set",
             positions.len() as f64,
             1.0,
             most,

@@ -46,7 +46,7 @@ impl LabelledImages {
                 Error::Value(wake_nn::Error::InvalidOption {
                     option: "image left out".to_owned(),
                     value: whole_files::sentence(name),
-                    expected: names.join(", "),
+                    expected: format!("one of {}", names.join(", ")),
                 })
             })?;
             tiles.rotate_left(place);
@@ -54,7 +54,7 @@ impl LabelledImages {
         }
         if let Some(count) = self.count {
             let most = tiles.len() as f64;
-            wake_nn::check_range("labelled images", count as f64, 1.0, most)?;
+            wake_nn::check_range("number of labelled images", count as f64, 1.0, most)?;
             tiles.truncate(count);
         }
         Ok(tiles)

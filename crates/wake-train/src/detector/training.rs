@@ -240,3 +240,49 @@ impl TrainingImages {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Weights after two steps on painted images, from those that ship.
+    fn trained(options: StageOptions) -> Vec<u8> {
+        let out = tempfile::tempdir().expect("a folder");
+        let start = out.path().join("start.safetensors");
+        let shipped = wake_detector::Detector::pretrained_weights();
+        std::fs::write(&start, shipped).expect("a file");
+        let training = DetectorTraining {
+            images: TrainingImages::Recipe {
+                recipe: ImageRecipe::Painted,
+                distinct: None,
+            },
+            weights: Some(start),
+            options: StageOptions {
+                steps: Some(2),
+                batch: Some(2),
+                ..options
+            },
+        };
+        let run = out.path().join("run");
+        training.train(&run, &|_| {}).expect("a training");
+        let file = run.join(WEIGHTS);
+        wake_detector::Detector::load(&file, &Device::default()).expect("finite weights");
+        std::fs::read(file).expect("weights")
+    }
+
+    /// Gradient checkpointing gives the same weights; gradients in bfloat16 give others.
+    #[test]
+    fn options_that_save_memory_train() {
+        let plain = trained(StageOptions::default());
+        let checkpointing = StageOptions {
+            checkpointing: true,
+            ..StageOptions::default()
+        };
+        assert!(trained(checkpointing) == plain);
+        let bf16 = StageOptions {
+            bf16: true,
+            ..StageOptions::default()
+        };
+        assert!(trained(bf16) != plain);
+    }
+}

@@ -100,7 +100,7 @@ pub(super) fn drawn(source: &dyn ImageSource, scenes: &[Scene], told: Told) -> R
     Err(Error::Value(wake_nn::Error::InvalidOption {
         option: "images of a source".to_owned(),
         value: format!("{} for {} scenes", images.len(), scenes.len()),
-        expected: "one of each scene, with its rows and columns".to_owned(),
+        expected: "one image per scene, with the rows and columns of its grid".to_owned(),
     }))
 }
 

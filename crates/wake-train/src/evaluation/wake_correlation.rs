@@ -78,7 +78,7 @@ pub(super) fn wedge(scene: &Scene) -> Result<Vec<bool>> {
         Error::Value(wake_nn::Error::InvalidOption {
             option: "scene".to_owned(),
             value: "without a ship".to_owned(),
-            expected: "one whose wake can be correlated".to_owned(),
+            expected: "a scene with a ship, whose wake can be correlated".to_owned(),
         })
     })?;
     let place = place(ship, scene);

@@ -92,9 +92,9 @@ impl<S: PromptedSource> FineTuneTask<S> {
     ) -> Result<Self> {
         if prediction == Prediction::Flow {
             return Err(Error::Value(wake_nn::Error::Unsupported {
-                option: "prediction of a fine-tuned model".to_owned(),
-                value: "flow".to_owned(),
-                supported: "noise, velocity, sample".to_owned(),
+                option: "prediction_type of a fine-tuned model".to_owned(),
+                value: "flow_prediction".to_owned(),
+                supported: "epsilon, v_prediction, sample".to_owned(),
             }));
         }
         let place = |device: &Device| OnDevice {

@@ -184,7 +184,7 @@ fn what_is_learnt(parts: &PipelineParts) -> Result<(NoiseSchedule, Prediction)> 
         Error::Value(wake_nn::Error::Unsupported {
             option: "scheduler of a fine-tuned model".to_owned(),
             value: scheduler.class().to_owned(),
-            supported: "those with a noise schedule to train with".to_owned(),
+            supported: "schedulers with a noise schedule, such as DDIMScheduler".to_owned(),
         })
     })?;
     let prediction = match scheduler.to_json()["prediction_type"].as_str() {
@@ -208,6 +208,6 @@ fn check_size(data: &Folder, count: usize, down: usize) -> Result<()> {
             "{count} images of {} x {} pixels in trainset.txt",
             grid.rows, grid.columns
         ),
-        expected: format!("one or more, of multiples of {down} pixels"),
+        expected: format!("at least one, with rows and columns that are multiples of {down}"),
     }))
 }

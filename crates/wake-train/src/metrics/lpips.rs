@@ -220,7 +220,11 @@ impl Lpips {
     /// If the shapes differ.
     #[must_use]
     pub fn distance(&self, one: Tensor<4>, other: Tensor<4>) -> Vec<LpipsDistance> {
-        assert_eq!(one.dims(), other.dims(), "images of different shape");
+        assert_eq!(
+            one.dims(),
+            other.dims(),
+            "both images must have the same shape"
+        );
         let pairs = one.dims()[0];
         let mut distances = vec![
             LpipsDistance {

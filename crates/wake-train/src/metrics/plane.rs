@@ -19,7 +19,7 @@ impl<'a> Plane<'a> {
     pub fn new(values: &'a [f32], columns: usize) -> Self {
         assert!(
             columns > 0 && values.len().is_multiple_of(columns),
-            "{} values are no rows of {columns}",
+            "{} values do not fill rows of {columns}",
             values.len()
         );
         Self { values, columns }
@@ -35,7 +35,7 @@ impl<'a> Plane<'a> {
         assert_eq!(
             (self.rows(), self.columns),
             (other.rows(), other.columns),
-            "planes of different size"
+            "both planes must have the same size"
         );
     }
 }
@@ -86,7 +86,11 @@ pub fn psnr(one: &Plane<'_>, other: &Plane<'_>, range: f64) -> f64 {
 #[must_use]
 pub fn correlation(one: &Plane<'_>, other: &Plane<'_>, mask: &[bool]) -> Option<f64> {
     one.assert_same_size(other);
-    assert_eq!(mask.len(), one.values.len(), "a mask of another size");
+    assert_eq!(
+        mask.len(),
+        one.values.len(),
+        "the mask must have one value per pixel"
+    );
     let pairs = || {
         let pairs = one.values.iter().zip(other.values).zip(mask);
         pairs

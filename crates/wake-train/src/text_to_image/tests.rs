@@ -124,7 +124,7 @@ fn images_of_another_size_are_refused() {
         .pair(0)
         .unwrap();
     let error = images.push(&pair).unwrap_err().to_string();
-    assert!(error.contains("[32, 32] as before"), "{error}");
+    assert!(error.contains("expected 32 x 32, as in"), "{error}");
     let mut empty = PromptedImages::default();
     empty.push(&pair).unwrap();
     assert_eq!((empty.len(), empty.size), (1, [256, 256]));

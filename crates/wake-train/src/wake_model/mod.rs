@@ -158,7 +158,7 @@ impl<'a> WakeTraining<'a> {
             Error::Value(wake_nn::Error::InvalidOption {
                 option: "pairs".to_owned(),
                 value: "none".to_owned(),
-                expected: "pairs to learn from: only the parser needs none".to_owned(),
+                expected: "training pairs; only the parser trains without them".to_owned(),
             })
         })
     }

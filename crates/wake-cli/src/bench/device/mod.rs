@@ -171,7 +171,7 @@ fn row(
         .as_ref()
         .and_then(|found| errors(&found.numbers, &flex.numbers));
     let failure = match (&found, errors) {
-        (Some(_), None) => Some("numbers that are not finite".to_owned()),
+        (Some(_), None) => Some("not all numbers are finite".to_owned()),
         _ => failure,
     };
     DeviceRow {
@@ -208,7 +208,7 @@ fn said(panic: &(dyn std::any::Any + Send)) -> String {
         .downcast_ref::<String>()
         .map(String::as_str)
         .or_else(|| panic.downcast_ref::<&str>().copied());
-    text.unwrap_or("a panic without a text")
+    text.unwrap_or("a panic without a message")
         .lines()
         .next()
         .unwrap_or_default()

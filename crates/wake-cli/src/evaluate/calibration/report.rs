@@ -241,13 +241,13 @@ impl Report {
             ""
         };
         let mut text = format!(
-            "<!-- Written by: wake evaluate calibration --images {} --checked {}{real} -->\n\n\
+            "<!-- Written by: wake evaluate calibration --images {0} --checked {1}{real} -->\n\n\
              # Probabilities of detections\n\n\
-             `probability` is the chance of a wake in either direction, `direction_probability` the chance that its tip and end are not \
-             taken for each other. Both are fitted by beta calibration on {} simulated and as many painted images, and checked on {} \
-             others of each kind. The probability holds for seas with as many wakes as those images; where ships are rarer, it is \
-             too high. Detections are *sure* from the score on that has at most {} false alarms per 1,000 km² of simulated sea \
-             without ships ({} images). Weights: CRC-32 {}.\n",
+             The score threshold of *sure* detections keeps false alarms on simulated sea without ships ({5} images) to at most {4} per \
+             1,000 km². `probability` is the chance of a wake in either direction, `direction_probability` the chance that tip and end \
+             are not confused. Where wakes are rarer than in the images of the fit, `probability` is too high.\n\n\
+             Fit: beta calibration on {2} simulated and as many painted images; check: {3} others of each kind. Weights: CRC-32 {6}. \
+             Cells of the reliability tables: mean probability, observed frequency, number of detections.\n",
             self.images,
             self.checked,
             self.images,
@@ -288,9 +288,9 @@ impl Mode {
         let bins = |kind: fn(&Check) -> Option<&Reliability>| {
             self.checks.iter().map(kind).collect::<Vec<_>>()
         };
-        text.push_str("\nReliability of the probability of a wake:\n\n");
+        text.push_str("\nReliability of `probability`:\n\n");
         reliability(text, &self.checks, &bins(|check| check.wake.as_ref()));
-        text.push_str("\nReliability of the probability of the direction:\n\n");
+        text.push_str("\nReliability of `direction_probability`:\n\n");
         reliability(text, &self.checks, &bins(|check| check.direction.as_ref()));
         text.push_str("\nFalse alarms on simulated sea without ships:\n\n");
         text.push_str("| sea | images | km² | sure detections | per 1,000 km² | at most (95 %) |\n| --- | --- | --- | --- | --- | --- |\n");
@@ -367,10 +367,10 @@ impl Tiles {
         };
         let _ = write!(
             text,
-            "\n## Real tiles\n\nThe probabilities of images of unknown spacing on {} real tiles ({:.1} megapixels of unknown spacing); clear \
-             and probable wakes count, doubtful ones are ignored. Nothing was fitted on them. Calibration error between {} and \
-             Brier score less that of a constant between {} in 95 % of draws of as many tiles. Sure detections: {} of {} \
-             wakes, {} false alarms ({:.2} a megapixel; {:.1} per 1,000 km² if pixels are 10 m).\n\n",
+            "\n## Real tiles\n\nSure detections find {4} of {5} clear and probable wakes on {0} real tiles ({1:.1} megapixels of unknown \
+             spacing), with {6} false alarms ({7:.2} a megapixel; {8:.1} per 1,000 km² if pixels are 10 m). Doubtful wakes are ignored; \
+             nothing was fitted on the tiles. 95 % bootstrap intervals over them: calibration error {2}, Brier score minus that of a \
+             constant {3}.\n\n",
             self.count,
             self.megapixels,
             range(self.calibration_error),
@@ -383,9 +383,9 @@ impl Tiles {
         );
         let checks = std::slice::from_ref(&self.check);
         summary(text, checks);
-        text.push_str("\nReliability of the probability of a wake:\n\n");
+        text.push_str("\nReliability of `probability`:\n\n");
         reliability(text, checks, &[self.check.wake.as_ref()]);
-        text.push_str("\nReliability of the probability of the direction:\n\n");
+        text.push_str("\nReliability of `direction_probability`:\n\n");
         reliability(text, checks, &[self.check.direction.as_ref()]);
     }
 }

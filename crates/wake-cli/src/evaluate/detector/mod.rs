@@ -54,7 +54,7 @@ fn rung(text: &str) -> Result<(String, PathBuf), String> {
         {
             Ok((name.to_owned(), PathBuf::from(file)))
         }
-        _ => Err("expected NAME=FILE, with a name that can be part of a file's".to_owned()),
+        _ => Err("expected NAME=FILE, with a NAME without slashes and commas".to_owned()),
     }
 }
 
@@ -83,7 +83,10 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
             .iter()
             .any(|(other, _)| other.eq_ignore_ascii_case(name))
         {
-            return Err(format!("--rung {name} has the name of another finder; rename it").into());
+            return Err(format!(
+                "--rung {name}: another detector has this name; choose another one"
+            )
+            .into());
         }
         finders.push((name, network(Some(file))?));
     }

@@ -15,7 +15,7 @@ pub(crate) fn tiles(folder: &Path) -> Outcome<Vec<Tile>> {
     Tile::read_all(folder).map_err(|error| match error {
         wake_train::Error::Detector(wake_detector::Error::Io { .. })
         | wake_train::Error::Value(wake_nn::Error::Io { .. }) => {
-            format!("{error}; --real names the folder of tiles and labels.json").into()
+            format!("{error}; give the folder of tiles and labels.json as --real").into()
         }
         error => error.into(),
     })

@@ -86,8 +86,8 @@ pub(crate) fn told_apart(real: &[Field]) -> Outcome<Vec<Value>> {
 
 /// Table of the accuracies.
 pub(crate) fn table(rows: &[Value]) -> String {
-    let mut text = "\n## The open sea\n\nAccuracy of a small network, trained on windows of the left halves of the real tiles, on patches of 64² \
-         pixels of the right halves (docs/reports/evaluation.md; 0.5: indistinguishable).\n\n\
+    let mut text = "\n## The open sea\n\nAccuracy of a classifier, trained on the left halves of the real tiles, on patches of 64² pixels of their \
+         right halves ([two-sample test](evaluation.md#two-sample-test-and-shape-of-the-sea); 0.5: indistinguishable).\n\n\
          | kinds | right | windows |\n| --- | --- | --- |\n"
         .to_owned();
     for row in rows {

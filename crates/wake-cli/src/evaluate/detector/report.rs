@@ -94,9 +94,8 @@ impl Report {
             // Writing into a string cannot fail.
             let _ = write!(
                 text,
-                "On {} real tiles with {} clear wakes the network reaches an average precision of {network:.2} and finds \
-                 {found:.2} of the wakes with at most half a false alarm an image; the classical Radon transform reaches \
-                 {radon:.2} and {classical:.2}. ",
+                "On {} real tiles with {} clear wakes the network has an average precision of {network:.2} and, at half a false \
+                 alarm per image, a recall of {found:.2}; a classical Radon transform has {radon:.2} and {classical:.2}. ",
                 rows[0]["count"], rows[0]["wakes"],
             );
         }
@@ -104,11 +103,11 @@ impl Report {
             let [network, radon] = precisions(rows);
             let _ = write!(
                 text,
-                "On {} simulated images with {} visible wakes they reach {network:.2} and {radon:.2}. ",
+                "On {} simulated images with {} visible wakes, average precision is {network:.2} (Radon transform: {radon:.2}). ",
                 rows[0]["count"], rows[0]["wakes"],
             );
         }
-        text + "`tests/foreign/real_tiles.py` gives the intervals over the tiles."
+        text + "`tests/foreign/real_tiles.py` computes intervals over the tiles."
     }
 
     pub(crate) fn text(&self) -> String {
@@ -120,9 +119,10 @@ impl Report {
         };
         let mut text = format!(
             "<!-- Written by: wake evaluate detector --images {count} --real DIR{rungs} -->\n\n# Finding wakes\n\n{}\n\n\
-             AP: average precision by the ray rule (axis within 10°; tip within 60 pixels, or axis line within 25 pixels of tip \
-             and middle). AP boxes: oriented boxes from the tip to the end of what is visible, IoU 0.5. Recall: with at most half \
-             a false alarm an image.\n\n\
+             - AP: average precision by the ray rule: axis within 10°; tip within 60 pixels, or axis line within 25 pixels of the \
+             label's tip and middle\n\
+             - AP boxes: average precision of oriented boxes from the tip to the visible end, IoU 0.5\n\
+             - Recall: at half a false alarm per image, which the last column's score allows\n\n\
              | images | number | wakes | found by | AP | AP boxes | recall | at score |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n",
             self.lead()
         );
@@ -145,13 +145,12 @@ impl Report {
             );
         }
         text.push_str(
-            "\n## Recall by visibility\n\nSimulated wakes by the expected change of the intensity (docs/labels.md), painted ones by the \
-             signal-to-noise ratio of a matched filter. Every trained network: [`detector_recall.csv`](detector_recall.csv).\n",
+            "\n## Recall by visibility\n\nBy [contrast](../labels.md#visibility) of simulated wakes and matched-filter signal-to-noise ratio \
+             of painted ones. All detectors: [`detector_recall.csv`](detector_recall.csv).\n",
         );
         text.push_str(&self.visibility.text);
         text.push_str(
-            "\n## Recall by scene\n\nSimulated wakes by sensor, wind, and the angle between wake and flight: at 0° the ship sails along \
-             the flight.\n",
+            "\n## Recall by scene\n\nBy sensor, wind, and angle between wake and flight (0°: the ship sails along the flight).\n",
         );
         text.push_str(&self.scenes.text);
         if !self.rungs.is_empty() {
@@ -174,8 +173,8 @@ impl Report {
         let name = |set: &&&Value| set.as_str().unwrap_or_default().to_owned();
         let titles: Vec<String> = sets.iter().map(|set| name(&set)).collect();
         let mut text = format!(
-            "\n## What transfer needs\n\nThe same network trained on other images: AP by the ray rule (and recall).\n\n\
-             ![Average precision on real tiles and on simulated images, by what the network was trained on](detector_transfer.svg)\n\n\
+            "\n## What transfer needs\n\nThe same network trained on other images: AP (and recall).\n\n\
+             ![Average precision on real tiles and on simulated images, by training images](detector_transfer.svg)\n\n\
              | trained on | {} |\n| --- |{}\n",
             titles.join(" | "),
             " --- |".repeat(titles.len()),

@@ -93,13 +93,13 @@ impl Report {
         }
         self.parts_of_error(&mut text);
         text.push_str(
-            "\nAn estimate is wrong if its speed is off by more than 10 %, or its heading by more than 5 degrees, or if there is no ship. \
-             The misfit is the largest factor between the residual's spectrum and the model's, in the median; a wrong assumption should raise it. \
-             Thread seconds are elapsed seconds times the threads of an estimate; other work on the machine makes them longer.\n\n\
-             Each set has its own scenes. Constants of the search were chosen with the first twelve of the paper's scenes in view, factors on the deviations \
-             with others. Place and heading before the estimate are wrong by 60 m along each axis and 3 degrees (standard deviations, at most two of them).\n\n\
-             The tables below are of the identifiable images, for sets with at least five of them. A Gaussian has 68 %, 95 % and 100 % of the errors within \
-             1, 2 and 3 standard deviations. Ranks count the images by Φ(error/deviation) in tenths: even numbers for exact error bars.\n",
+            "\n- Wrong: speed off by more than 10 %, heading off by more than 5 degrees, or no ship in the image.\n\
+             - Misfit: largest factor between the spectra of residual and model (median); a wrong assumption should raise it.\n\
+             - Thread seconds: elapsed seconds times threads; other work on the machine adds to them.\n\
+             - Sighting: place and heading have errors of 60 m along each axis and 3 degrees (standard deviations, clipped at two).\n\
+             - Tuning: constants of the search on the first twelve of the paper's scenes, factors on the deviations on others.\n\
+             - Tables of errors: identifiable images of sets with at least five. A Gaussian has 68 %, 95 % and 100 % within 1, 2 and 3 deviations.\n\
+             - Ranks: images by tenths of Φ(error/deviation), equally many for exact error bars.\n",
         );
         for figures in &self.sets {
             figures.write(&mut text);
@@ -121,9 +121,9 @@ impl Report {
             return;
         }
         text.push_str(
-            "\nWhich part the errors come from: the estimate is also begun at the true scene (no search), on images with the model's own mean image under a simulated sea, \
-             and on images that follow the model in all.\n\n\
-             | right from the start | identifiable | speed: within 1, 2 deviations | speed: squared error over bound | heading: within 1, 2 deviations | heading: squared error over bound |\n\
+            "\nSources of error, removed one by one: start at the true scene (no search); the model's own mean image under a simulated sea; \
+             images drawn from the model.\n\n\
+             | removed | identifiable | speed: within 1, 2 deviations | speed: squared error over bound | heading: within 1, 2 deviations | heading: squared error over bound |\n\
              | --- | --- | --- | --- | --- | --- |\n",
         );
         for (set, known) in figures {
@@ -216,9 +216,9 @@ impl Figures {
         // Writing into a string cannot fail.
         let _ = writeln!(
             text,
-            "Of {} simulated images of the paper's scenes, {} are identifiable, and {} of these are wrong. Their speed is off by {} m/s in the median and \
-             their heading by {} degrees; {} of the speeds and {} of the headings lie within one and two of the standard deviations that were given. \
-             In {tellable} scenes the Cramér–Rao bound of the speed is below {TELLING} m/s, and {told} of these are identifiable.\n",
+            "Of {} simulated images of the paper's scenes, {} are [identifiable](../estimate.md), and {} of these estimates are wrong. Median errors are \
+             {} m/s in speed and {} degrees in heading; {} of the speeds and {} of the headings lie within one and two reported standard deviations. \
+             The Cramér–Rao bound of the speed is below {TELLING} m/s in {tellable} images, of which {told} are identifiable.\n",
             self.images,
             self.identifiable,
             self.wrong,

@@ -70,7 +70,7 @@ impl Set {
         if options.satellites > 0 {
             add(
                 "detector",
-                "scenes of the recipe detector with one ship: seven sensors, gusts, swell, slicks and shallow water that the estimator does not know",
+                "scenes of the recipe detector with one ship: seven sensors, shallow water, and gusts, swell and slicks unknown to the estimator",
                 options.satellites.into(),
                 Kind::Detector(Box::new(Simulated::new(recipe, SEED)?)),
             );
@@ -80,7 +80,7 @@ impl Set {
             let spacing = HeldOut::default().base.grid.spacing as f32;
             add(
                 "detected",
-                "paper's scenes, around the likeliest wake that the detector finds",
+                "paper's scenes, sighted by the detector: its wake with the highest score",
                 others,
                 Kind::Detected(Box::new(detector.with_spacing(spacing)?)),
             );

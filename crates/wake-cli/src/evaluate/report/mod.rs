@@ -47,7 +47,7 @@ fn seconds(report: &Report) -> String {
         }
     };
     let mut text = format!(
-        "## Seconds per image\n\n| pixels | simulator | harmonic sum, 2 x 10⁴ waves | wake model |{}\n\
+        "## Seconds per image\n\n| pixels | simulator | harmonic sum, 2 x 10⁴ waves | model |{}\n\
          | --- | --- | --- | --- |{}\n",
         cell("text to image"),
         cell("---")
@@ -71,8 +71,7 @@ fn papers(paper: &Paper) -> String {
         "## The paper's own figures\n\n\
          | SSIM | PSNR dB | LPIPS | seconds at 256 x 256 | over its simulator |\n| --- | --- | --- | --- | --- |\n\
          | {} | {} | {} | {} (RTX 3090) | up to {} times faster |\n\n\
-         They cannot be compared with the figures above: they are of another simulator's images, in another mapping to grey, \
-         and of one sample a scene.\n",
+         Not comparable with the figures above: another simulator, another mapping to grey, one sample per scene.\n",
         paper.ssim, paper.psnr_db, paper.lpips, paper.seconds_256, paper.speed_up
     )
 }

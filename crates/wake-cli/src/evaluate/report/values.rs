@@ -14,8 +14,8 @@ fn errors(errors: &AbsoluteErrors) -> String {
 
 pub(super) fn measurements(title: &str, rows: &[MeasurementRow]) -> String {
     let mut text = format!(
-        "## {title}\n\nAbsolute error: median, 90th percentile, share of scenes in which the value is measurable. For model and \
-         Gaussian sea the share is of the scenes that are measurable in the simulated image.\n\n\
+        "## {title}\n\nAbsolute error: median, 90th percentile, share of scenes in which the value is measurable (for model and \
+         Gaussian sea, of those measurable in the simulated image).\n\n\
          | value | unit | simulator median | p90 | share | model median | p90 | share | Gaussian sea median | p90 | share |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
     );
@@ -60,8 +60,8 @@ pub(super) fn conditions(report: &Report) -> String {
 }
 
 pub(super) fn controllability(report: &Report) -> String {
-    let mut text = "## One value changed\n\nShare of pairs in which the measured value changes in the same direction, of the pairs \
-        in which it does on simulated images.\n\n| value | condition | pairs | counted | right |\n| --- | --- | --- | --- | --- |\n"
+    let mut text = "## One value changed\n\nOf the pairs counted, in which the measured value changes in the right direction on simulated \
+        images, the share in which it also does on generated ones.\n\n| value | condition | pairs | counted | right |\n| --- | --- | --- | --- | --- |\n"
         .to_owned();
     for r in &report.figures.controllability {
         text += &format!(

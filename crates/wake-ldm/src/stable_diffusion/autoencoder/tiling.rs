@@ -28,11 +28,11 @@ impl Tiling {
         let Self { tile, overlap } = self;
         assert!(
             tile > 0 && tile.is_multiple_of(downsampling),
-            "a tile of {tile} pixels; its side must be a multiple of {downsampling}"
+            "the tile side is {tile} pixels, expected a multiple of {downsampling}"
         );
         assert!(
             (0.0..=0.5).contains(&overlap),
-            "tiles overlap by {overlap} of their side; it must lie in 0…0.5"
+            "the overlap is {overlap} of the tile side, expected 0 to 0.5"
         );
         let latent = tile / downsampling;
         let overlap = share(latent, overlap);

@@ -107,7 +107,8 @@ fn take_patterns(options: &mut Options) -> Result<Vec<(String, f64)>> {
     let patterns = value
         .as_object()
         .and_then(|map| map.iter().map(entry).collect());
-    patterns.ok_or_else(|| options.unsupported("alpha_pattern", &value, "layer names with numbers"))
+    let supported = "layer names, without wildcards, with numbers from -1e6 to 1e6";
+    patterns.ok_or_else(|| options.unsupported("alpha_pattern", &value, supported))
 }
 
 #[cfg(test)]

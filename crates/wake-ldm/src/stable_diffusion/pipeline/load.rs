@@ -116,6 +116,6 @@ fn must_agree(option: &str, value: usize, expected: usize) -> Result<()> {
     Err(Error::Model(wake_nn::Error::InvalidOption {
         option: format!("{option} of the U-Net"),
         value: value.to_string(),
-        expected: format!("{expected}, as the other models have it"),
+        expected: format!("{expected}, as in the other models"),
     }))
 }

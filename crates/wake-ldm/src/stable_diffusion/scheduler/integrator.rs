@@ -55,7 +55,7 @@ fn take_prediction(options: &mut Options, spread: Spread, data: bool) -> Result<
     match (spread, data) {
         (Spread::Flow, true) => Prediction::take(options, &[Prediction::Flow]),
         (Spread::Flow, false) => {
-            let supported = "false in terms of the noise (dpmsolver, predict_x0 false)";
+            let supported = "false if the noise is integrated (dpmsolver, or predict_x0 false)";
             Err(options.unsupported("use_flow_sigmas", &true.into(), supported))
         }
         _ => Prediction::take(options, &Prediction::CURVED),

@@ -251,7 +251,7 @@ mod tests {
         let error = new(BetaCurve::Trained(vec![0.1]), 3)
             .unwrap_err()
             .to_string();
-        assert_eq!(error, "length of trained_betas is 1, outside [3, 3]");
+        assert_eq!(error, "length of trained_betas is 1, expected 3");
     }
 
     /// Variances of the linear schedule equal the published ones.

@@ -112,7 +112,7 @@ impl WakeModelConfig {
             return Err(Error::Model(wake_nn::Error::InvalidOption {
                 option: "image_size".to_owned(),
                 value: self.image_size.to_string(),
-                expected: "a multiple of 32 and of 8 fold".to_owned(),
+                expected: "a multiple of 32 and of 8 × fold".to_owned(),
             }));
         }
         self.grey.validate()?;
@@ -156,7 +156,7 @@ impl WakeModelConfig {
             return Err(Error::Model(wake_nn::Error::InvalidOption {
                 option: "grid".to_owned(),
                 value: format!("{rows} × {columns} pixels of {} m", grid.spacing),
-                expected: format!("{size} × {size} pixels, as the model draws them"),
+                expected: format!("{size} × {size} pixels, the model's image size"),
             }));
         }
         self.training_ranges.check(scene)

@@ -79,7 +79,7 @@ impl TrainingRanges {
                 return Err(Error::Model(wake_nn::Error::InvalidOption {
                     option,
                     value: value.to_string(),
-                    expected: format!("{seen}, as in the images that the model was trained with"),
+                    expected: format!("{seen}, as in the training images of the model"),
                 }));
             }
         }

@@ -28,7 +28,10 @@ impl SeaImage {
             return Err(Error::Model(wake_nn::Error::InvalidOption {
                 option: "mask".to_owned(),
                 value: format!("{} x {} pixels", mask.rows, mask.columns),
-                expected: format!("{} x {}, as its image", amplitude.rows, amplitude.columns),
+                expected: format!(
+                    "{} x {}, the size of the image",
+                    amplitude.rows, amplitude.columns
+                ),
             }));
         }
         Ok(Self {

@@ -26,12 +26,12 @@ const RANGES: [(&str, f64, f64); NUMBERS] = [
     ("mean", 0.5, 2.0),
     ("spread", 1e-3, 2.0),
     ("skewness", -20.0, 20.0),
-    ("correlation along rows", -1.0, 1.0),
-    ("correlation along rows", -1.0, 1.0),
-    ("correlation along columns", -1.0, 1.0),
-    ("correlation along columns", -1.0, 1.0),
-    ("variation of blocks of 8", 0.0, 2.0),
-    ("variation of blocks of 32", 0.0, 2.0),
+    ("correlation along rows at lag 1", -1.0, 1.0),
+    ("correlation along rows at lag 2", -1.0, 1.0),
+    ("correlation along columns at lag 1", -1.0, 1.0),
+    ("correlation along columns at lag 2", -1.0, 1.0),
+    ("variation of means of 8 x 8 pixels", 0.0, 2.0),
+    ("variation of means of 32 x 32 pixels", 0.0, 2.0),
 ];
 
 /// Statistics of a patch of open sea, of its amplitude divided by its median.
@@ -99,8 +99,8 @@ impl SeaStyle {
         let Some(correlation) = Correlation::new(LAGS, correlation.to_vec()) else {
             return Err(Error::Model(wake_nn::Error::InvalidOption {
                 option: "correlation".to_owned(),
-                value: "beyond -1 to 1, or not 1 of a pixel with itself".to_owned(),
-                expected: "what `wake train sea` writes".to_owned(),
+                value: "outside [-1, 1], or not 1 at lag 0".to_owned(),
+                expected: "a file written by `wake train sea`".to_owned(),
             }));
         };
         let numbers = std::array::from_fn(|n| numbers.get(n).copied().unwrap_or(f32::NAN));

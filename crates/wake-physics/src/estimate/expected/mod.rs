@@ -208,9 +208,9 @@ impl ExpectedImage {
         check(scene, &models, values)?;
         if models.wakes.len() != self.frozen.ships {
             return Err(Error::Conflict {
-                name: "ship".to_owned(),
-                value: format!("{} ships", models.wakes.len()),
-                requirement: format!("but the plan is one of {}", self.frozen.ships),
+                name: "number of ships".to_owned(),
+                value: models.wakes.len().to_string(),
+                requirement: format!("but the plan was made for {}", self.frozen.ships),
             });
         }
         let surface = Surface::new(&self.frozen, scene, &models, values);
@@ -261,11 +261,11 @@ fn check(scene: &Scene, models: &Models, values: &[Value]) -> Result<()> {
         })
     };
     if models.wakes.iter().any(|wake| wake.track.turn().is_some()) {
-        let requirement = "but an image is differentiated for ships that go straight";
+        let requirement = "but derivatives need ships on straight tracks: set it to 0";
         return conflict("ship.turn_rate", "not 0".to_owned(), requirement);
     }
     if models.short_waves_vanish() {
-        let requirement = "but an image is differentiated for seas with wind";
+        let requirement = "but derivatives need a wind that raises short waves: raise it";
         return conflict(
             "sea.wind_speed",
             scene.sea.wind_speed.to_string(),
@@ -275,7 +275,7 @@ fn check(scene: &Scene, models: &Models, values: &[Value]) -> Result<()> {
     if let Some(value) = values.iter().find(|v| v.is_of_ship())
         && scene.ships.is_empty()
     {
-        let requirement = "but the scene has no ship";
+        let requirement = "but the scene has no ship: add one";
         return conflict(value.key(), "to be estimated".to_owned(), requirement);
     }
     Ok(())

@@ -107,8 +107,8 @@ impl SeaTexture {
         let broken = |what: String| {
             Error::Model(wake_nn::Error::InvalidOption {
                 option: path.display().to_string(),
-                value: format!("no learnt sea: {what}"),
-                expected: "a file that `wake train sea` wrote".to_owned(),
+                value: format!("not a learnt sea ({what})"),
+                expected: "a file written by `wake train sea`".to_owned(),
             })
         };
         let style = |(n, (numbers, correlation)): (usize, (&[f32], &[f32]))| {
@@ -172,8 +172,10 @@ impl SeaTexture {
                     option: "grid.spacing".to_owned(),
                     value: format!("{spacing} m"),
                     expected: format!(
-                        "{learnt} m, the pixels of the learnt sea, to a quarter; learn from images of such pixels, or \
-                         without telling their size"
+                        "{:.3} to {:.3} m, within a quarter of the learnt sea's {learnt} m; train on images of your \
+                         spacing, or without a spacing",
+                        learnt / LARGEST_RATIO,
+                        learnt * LARGEST_RATIO
                     ),
                 }))
             }
@@ -297,9 +299,9 @@ fn check_size(rows: usize, columns: usize) -> Result<()> {
             let [needed, free] = [needed, free].map(|bytes| bytes as f64 / (1u64 << 30) as f64);
             Err(Error::Model(wake_nn::Error::InvalidOption {
                 option: "image".to_owned(),
-                value: format!("{rows} x {columns} pixels, a learnt sea of {needed:.1} GiB"),
+                value: format!("{rows} x {columns} pixels, which need {needed:.1} GiB"),
                 expected: format!(
-                    "no more than the {free:.1} GiB of free memory; draw smaller images"
+                    "at most the {free:.1} GiB of free memory; ask for a smaller image"
                 ),
             }))
         }
