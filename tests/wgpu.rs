@@ -53,7 +53,10 @@ fn smallest(class: &str) -> (PathBuf, Golden) {
 fn a_gpu_that_is_not_there_is_an_error() {
     assert_eq!(wake_nn::device_named("wgpu").unwrap(), device());
     let error = wake_nn::device_named("wgpu:99").unwrap_err().to_string();
-    assert!(error.contains("device 'wgpu:99' is not available"), "{error}");
+    assert!(
+        error.contains("device 'wgpu:99' is not available"),
+        "{error}"
+    );
 }
 
 #[test]

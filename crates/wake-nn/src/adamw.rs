@@ -36,10 +36,11 @@ pub struct Step {
 impl Step {
     /// Returns weights w, moments m and v, and averaged weights a after the step.
     ///
-    /// On burn's CPU backend, f32 tensors that nobody else holds are updated in place, in one pass on all cores; the results are
-    /// the same, bit by bit.
+    /// On burn's CPU backend, unshared f32 tensors outside autodiff are updated in place, in one pass on all cores, with the same
+    /// results bit by bit. Shared tensors are copied first.
     ///
-    /// - `state`: w, m, v and a, as long as the gradient
+    /// - `gradient`: `[n]`
+    /// - `state`: w, m, v and a, each `[n]`; v at least 0
     #[must_use]
     pub fn apply(&self, gradient: Tensor<1>, state: [Tensor<1>; 4]) -> [Tensor<1>; 4] {
         #[cfg(feature = "flex")]
@@ -69,7 +70,7 @@ mod native {
     /// Elements that one task updates, few enough for five slices to fit a cache of the second level.
     const CHUNK: usize = 1 << 14;
 
-    /// The tensors unchanged unless all are f32 on burn's CPU backend, outside autodiff.
+    /// Arguments that are returned unchanged unless all are f32 on burn's CPU backend, outside autodiff.
     type Unchanged = Box<(Tensor<1>, [Tensor<1>; 4])>;
 
     pub(super) fn apply(

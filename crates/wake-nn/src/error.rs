@@ -208,7 +208,7 @@ impl std::fmt::Display for Misshapen {
     }
 }
 
-/// What a closed range allows, as the end of a message.
+/// Closed range, as the end of a message.
 fn expectation(min: f64, max: f64) -> String {
     if max > min {
         return format!("outside [{}, {}]", number(min), number(max));

@@ -41,8 +41,8 @@ pub struct StageOptions {
     pub seed: u64,
     /// Whether to resume from the newest checkpoint.
     pub resume: bool,
-    /// Whether to use gradient checkpointing: burn's elementwise operations are computed again instead of stored. Kernels of
-    /// this project on burn's CPU backend are not.
+    /// Gradient checkpointing: recomputes burn's elementwise operations instead of storing their results. It does not affect the
+    /// kernels of `wake-nn` on the CPU, and saves no memory there.
     pub checkpointing: bool,
     /// Whether losses and gradients are computed in bfloat16; weights keep 32 bits.
     pub bf16: bool,

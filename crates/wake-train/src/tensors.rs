@@ -128,7 +128,7 @@ impl<F: FnMut(Tensor<1>) -> Tensor<1>> ModuleMapper for Changer<F> {
 
 /// State of a parameter in autodiff.
 struct Learning {
-    /// What autodiff stores for the gradients; `None` outside autodiff.
+    /// Checkpointing strategy; `None` outside autodiff.
     strategy: Option<GradientCheckpointingStrategy>,
     gradient: bool,
 }
