@@ -203,17 +203,18 @@ impl Recipe {
     ///
     /// [`wake_nn::Error::InvalidOption`] for another name.
     pub fn named(name: &str) -> Result<Self> {
+        let unknown = || unknown(name, "paper, ranges, satellites, detector or model");
+        Self::built_in(name).unwrap_or_else(|| Err(unknown()))
+    }
+
+    fn built_in(name: &str) -> Option<Result<Self>> {
         match name {
-            "paper" => Ok(Self::paper()),
-            "ranges" => Ok(Self::default()),
-            "satellites" => Self::satellites(),
-            "detector" => Self::detector(),
-            "model" => Self::model(),
-            _ => Err(Error::Value(wake_nn::Error::InvalidOption {
-                option: "recipe".to_owned(),
-                value: sentence(name),
-                expected: "paper, ranges, satellites, detector or model".to_owned(),
-            })),
+            "paper" => Some(Ok(Self::paper())),
+            "ranges" => Some(Ok(Self::default())),
+            "satellites" => Some(Self::satellites()),
+            "detector" => Some(Self::detector()),
+            "model" => Some(Self::model()),
+            _ => None,
         }
     }
 
@@ -221,12 +222,15 @@ impl Recipe {
     ///
     /// # Errors
     ///
-    /// As [`Recipe::named`] if there is no such file, else as [`Recipe::read`].
+    /// [`wake_nn::Error::InvalidOption`] if there is no such file, else as [`Recipe::read`].
     pub fn named_or_read(name: &str) -> Result<Self> {
-        let file = Path::new(name);
-        match Self::named(name) {
-            Err(_) if file.is_file() => Self::read(file),
-            named => named,
+        match (Self::built_in(name), Path::new(name)) {
+            (Some(recipe), _) => recipe,
+            (None, file) if file.is_file() => Self::read(file),
+            (None, _) => Err(unknown(
+                name,
+                "paper, ranges, satellites, detector, model or an existing TOML file",
+            )),
         }
     }
 
@@ -396,4 +400,13 @@ fn merge(table: &mut toml::Table, changes: toml::Table) {
             }
         }
     }
+}
+
+/// The error for a name that is no recipe.
+fn unknown(name: &str, expected: &str) -> Error {
+    Error::Value(wake_nn::Error::InvalidOption {
+        option: "recipe".to_owned(),
+        value: sentence(name),
+        expected: expected.to_owned(),
+    })
 }

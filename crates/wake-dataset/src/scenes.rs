@@ -518,6 +518,16 @@ mod tests {
     }
 
     #[test]
+    fn a_name_that_is_neither_recipe_nor_file_is_refused_with_both() {
+        let message = Recipe::named_or_read("papers").unwrap_err().to_string();
+        assert!(
+            message.contains("recipe is papers")
+                && message.contains("detector, model or an existing TOML file"),
+            "{message}"
+        );
+    }
+
+    #[test]
     fn bad_recipes_are_refused_by_name() {
         for (text, word) in [
             ("speckles = true", "speckles"),

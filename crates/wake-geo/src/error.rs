@@ -27,6 +27,13 @@ pub enum Error {
     )]
     Unreadable { path: PathBuf, why: String },
 
+    /// A file of the coast without usable polygons.
+    #[error(
+        "{} cannot be read as land ({why}); give a GeoJSON file with polygons of the land",
+        shown(path)
+    )]
+    Land { path: PathBuf, why: String },
+
     /// A Sentinel-1 product of a type other than GRD.
     #[error(
         "{} is a Sentinel-1 product of type {found}, but only Level-1 GRD can be read; download the GRD product of the \
@@ -58,7 +65,7 @@ pub enum Error {
     NoMeasurement { path: PathBuf },
 
     /// Content that cannot be right.
-    #[error("{file:?}: {why}; the file is damaged: download the product again")]
+    #[error("{file:?}: {why}; the file is damaged: download or write it again")]
     Damaged { file: String, why: String },
 
     /// A value above a limit of this crate.

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use flate2::read::ZlibDecoder;
 use serde_json::Value;
+use whole_files::sentence;
 
 use crate::error::{Error, Result};
 use crate::product::Product;
@@ -90,19 +91,20 @@ impl Land {
     /// A file that cannot be read, is not GeoJSON, or has no polygon or more than five million points.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = whole_files::read_regular(path).map_err(|e| Error::io(path, e))?;
+        let wrong = |why: String| Error::Land {
+            path: path.to_owned(),
+            why: sentence(&why),
+        };
         let file: Value = serde_json::from_slice(&bytes)
-            .map_err(|e| Error::unreadable(path, format!("it is not valid JSON: {e}")))?;
+            .map_err(|e| wrong(format!("it is not valid JSON: {e}")))?;
         let mut land = Self::default();
         land.add(&file);
         let points: usize = land.rings.iter().map(Vec::len).sum();
         match points {
-            0 => Err(Error::unreadable(path, "it has no GeoJSON polygon")),
-            count if count > MOST_POINTS => Err(Error::unreadable(
-                path,
-                format!(
-                    "its {count} points exceed the limit of {MOST_POINTS}; give a coarser coastline"
-                ),
-            )),
+            0 => Err(wrong("it has no polygon".to_owned())),
+            count if count > MOST_POINTS => Err(wrong(format!(
+                "its {count} points exceed the limit of {MOST_POINTS}; use a coarser coastline"
+            ))),
             _ => Ok(land),
         }
     }
@@ -369,7 +371,7 @@ mod tests {
             Land::read(file.path())
                 .unwrap_err()
                 .to_string()
-                .contains("no GeoJSON polygon")
+                .contains("(it has no polygon); give a GeoJSON file")
         );
     }
 }

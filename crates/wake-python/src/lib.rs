@@ -22,6 +22,9 @@ use pyo3::prelude::*;
 #[pymodule(name = "_core")]
 fn core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    // The shortest decimal number that is this f32: 0.03, not 0.029999999.
+    let least_score: f64 = wake_detector::LEAST_SCORE.to_string().parse()?;
+    module.add("LEAST_SCORE", least_score)?;
     simulate::register(module)?;
     estimate::register(module)?;
     dataset::register(module)?;

@@ -13,6 +13,9 @@ use crate::error::{Error, Result};
 use crate::limits::{CACHE_BYTES, CHUNK_BYTES};
 use crate::read_at::{ReadAt, Reader};
 
+/// Advice for files whose strips or tiles are too large.
+const TILED: &str = "write the file in tiles: `gdal_translate -co TILED=YES`";
+
 /// The first image of a TIFF file.
 pub(crate) struct Chunks {
     file: String,
@@ -119,7 +122,7 @@ impl Chunks {
                 what: "the size of a compressed strip or tile in bytes",
                 value: chunk,
                 limit: CHUNK_BYTES as u64,
-                remedy: "write the file in tiles: `gdal_translate -co TILED=YES`",
+                remedy: TILED,
             });
         }
         for index in 0..expected {
@@ -274,9 +277,13 @@ impl Chunks {
         };
         let packed = self.byte_counts[index];
         if packed > CHUNK_BYTES as u64 {
-            return Err(damaged(format!(
-                "it has {packed} bytes, above the limit {CHUNK_BYTES}"
-            )));
+            return Err(Error::TooLarge {
+                file: self.file.clone(),
+                what: "the size of an LZW strip or tile in bytes",
+                value: packed,
+                limit: CHUNK_BYTES as u64,
+                remedy: TILED,
+            });
         }
         let mut bytes = vec![0; packed as usize];
         let read = self.source.read_exact_at(self.offsets[index], &mut bytes);

@@ -206,6 +206,11 @@ pub(super) fn failed(file: &str, error: &TiffError) -> Error {
             what: sentence(&format!("a feature of this TIFF ({what})")),
             remedy: CONVERT,
         },
+        TiffError::LimitsExceeded => Error::Unsupported {
+            file: file.to_owned(),
+            what: format!("a strip or tile of more than {CHUNK_BYTES} bytes"),
+            remedy: CONVERT,
+        },
         other => Error::damaged(
             file,
             sentence(&format!("it is not a readable TIFF file ({other})")),

@@ -88,10 +88,9 @@ impl Ship {
             return Ok(());
         }
         let degrees = |radius: f64| (self.speed / radius).to_degrees();
-        Err(Error::Conflict {
-            name: format!("{name}.turn_rate"),
-            value: format!("{} degrees per second", self.turn_rate),
-            requirement: format!(
+        let requirement = match self.speed > 0.0 {
+            false => "but a ship at rest cannot turn; use 0, or give it a speed".to_owned(),
+            true => format!(
                 "but a ship of {} m at {} m/s can turn by {:.2e} to {:.3} degrees per second, on a radius of {} km to {smallest:.0} m; use 0 for a straight track",
                 self.length,
                 self.speed,
@@ -99,6 +98,11 @@ impl Ship {
                 degrees(smallest),
                 1e-3 * WIDEST_TURN,
             ),
+        };
+        Err(Error::Conflict {
+            name: format!("{name}.turn_rate"),
+            value: format!("{} degrees per second", self.turn_rate),
+            requirement,
         })
     }
 
@@ -564,6 +568,8 @@ mod tests {
         ] {
             let message = turned(keys).unwrap_err().to_string();
             assert!(message.contains("ship.turn_rate is "), "{message}");
+            let at_rest = keys.contains(&"ship.speed=0");
+            assert_eq!(message.contains("at rest"), at_rest, "{message}");
         }
         assert!(turned(&["ship.speed=20", "ship.turn_rate=2.2"]).is_ok());
     }

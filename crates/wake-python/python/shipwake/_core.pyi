@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 __version__: str
+LEAST_SCORE: float
 
 _Floats: TypeAlias = npt.NDArray[np.float32]
 _Levels: TypeAlias = npt.NDArray[np.uint8]

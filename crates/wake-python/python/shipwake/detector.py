@@ -14,7 +14,7 @@ from .product import Product
 
 __all__ = ["LEAST_SCORE", "Detection", "Detector"]
 
-LEAST_SCORE = 0.03
+LEAST_SCORE: float = _core.LEAST_SCORE
 """Default least score: wakes with lower scores are not reported."""
 
 
