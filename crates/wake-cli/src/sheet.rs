@@ -154,7 +154,7 @@ impl Picture {
     }
 
     /// Draws a dashed line, clipped to the picture; a line with an end that is not finite is skipped.
-    fn draw_line(&mut self, line: [Pixel; 2], colour: Colour) {
+    pub(crate) fn draw_line(&mut self, line: [Pixel; 2], colour: Colour) {
         let Some([from, to]) = self.cut(line) else {
             return;
         };
@@ -251,14 +251,6 @@ impl Picture {
         let lines = other.pixels.chunks(other.columns.max(1));
         for (row, line) in (top..self.rows).zip(lines) {
             self.pixels[row * self.columns + left..][..wide].copy_from_slice(&line[..wide]);
-        }
-    }
-
-    /// Draws a closed polygon.
-    #[cfg(any(feature = "bench", test))]
-    pub(crate) fn draw_outline(&mut self, corners: &[Pixel], colour: Colour) {
-        for (n, &corner) in corners.iter().enumerate() {
-            self.draw_line([corner, corners[(n + 1) % corners.len()]], colour);
         }
     }
 

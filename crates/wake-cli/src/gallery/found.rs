@@ -12,8 +12,10 @@ use crate::sheet::Picture;
 const SCENE: &str = "assets/scenes/four_ships.toml";
 /// Pixels of the scene's image per pixel of the panel, along each side.
 const REDUCED: usize = 2;
+/// Distance of a probability from the tip \[pixels of the image\].
+const AHEAD: f32 = 48.0;
 
-/// The image with sure detections and their probabilities, and a small copy without them.
+/// The image with the axes and probabilities of sure detections, and a small copy without them.
 pub(crate) fn panel() -> Outcome<Picture> {
     let scene = Scene::read(SCENE.as_ref())?;
     let simulation = simulate(&scene)?;
@@ -24,14 +26,15 @@ pub(crate) fn panel() -> Outcome<Picture> {
     let detector = Detector::pretrained(&device_named("flex")?)?.with_spacing(spacing as f32)?;
     let mut picture = marked(&means(&levels, side), spacing * REDUCED as f64);
     for one in detector.find(&image).iter().filter(|one| one.sure) {
-        let corners = one.wake.oriented_box();
-        let corners = corners.map(|corner| corner.map(|v| f64::from(v) / REDUCED as f64));
-        picture.draw_outline(&corners, FOUND);
-        let top = corners.iter().map(|c| c[1]).fold(f64::MAX, f64::min);
-        let left = corners.iter().map(|c| c[0]).fold(f64::MAX, f64::min);
+        let place = |along: f32| one.wake.at(along).map(|v| f64::from(v) / REDUCED as f64);
+        picture.draw_line([place(0.0), place(one.wake.length)], FOUND);
         if let Some(probability) = one.probability {
-            let [top, left] = [top - 8.0, left - 30.0].map(|v| v.max(0.0) as usize);
-            picture.write_text(&format!("{probability:.2}"), top, left);
+            // Ahead of the ship, within the picture.
+            let [x, y] = place(-AHEAD);
+            let [left, top] = [x - 16.0, y - 8.0];
+            let within = |v: f64, room: usize| v.clamp(0.0, (SIDE - room) as f64) as usize;
+            let text = format!("{probability:.2}");
+            picture.write_text(&text, within(top, 16), within(left, 32));
         }
     }
     set_in(&mut picture, &Picture::reduced(&levels, side, SIDE / 3));
