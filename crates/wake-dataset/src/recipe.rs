@@ -203,8 +203,8 @@ impl Recipe {
     ///
     /// [`wake_nn::Error::InvalidOption`] for another name.
     pub fn named(name: &str) -> Result<Self> {
-        let unknown = || unknown(name, "paper, ranges, satellites, detector or model");
-        Self::built_in(name).unwrap_or_else(|| Err(unknown()))
+        let names = "paper, ranges, satellites, detector or model";
+        Self::built_in(name).unwrap_or_else(|| Err(unknown(name, names)))
     }
 
     fn built_in(name: &str) -> Option<Result<Self>> {
