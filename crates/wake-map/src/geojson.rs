@@ -54,7 +54,8 @@ pub(crate) fn properties(wake: &MappedWake) -> Map<String, Value> {
         "speed_m_s": ship.map(|ship| ship.speed), "speed_sd_m_s": ship.map(|ship| ship.speed_deviation),
         "estimated_heading_deg": ship.map(|ship| ship.heading), "estimated_heading_sd_deg": ship.map(|ship| ship.heading_deviation),
         "wind_speed_m_s": ship.map(|ship| ship.wind_speed), "wind_speed_sd_m_s": ship.map(|ship| ship.wind_speed_deviation),
-        "wind_toward_deg": ship.map(|ship| ship.wind_toward), "misfit": ship.map(|ship| ship.misfit),
+        "wind_toward_deg": ship.map(|ship| ship.wind_toward), "wind_toward_sd_deg": ship.map(|ship| ship.wind_toward_deviation),
+        "misfit": ship.map(|ship| ship.misfit),
     });
     match properties {
         Value::Object(properties) => properties,

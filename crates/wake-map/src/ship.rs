@@ -21,6 +21,8 @@ pub struct EstimatedShip {
     pub wind_speed_deviation: f64,
     /// Direction that the wind blows toward, clockwise from true north \[degrees\]; it may be reversed.
     pub wind_toward: f64,
+    /// Standard deviation of the wind's axis \[degrees\].
+    pub wind_toward_deviation: f64,
     /// Largest misfit of the residual spectrum, as a factor.
     pub misfit: f64,
 }

@@ -6,7 +6,7 @@ use crate::geojson::properties;
 use crate::wake::MappedWake;
 
 /// The columns of the table.
-const COLUMNS: [&str; 26] = [
+const COLUMNS: [&str; 27] = [
     "probability",
     "sure",
     "score",
@@ -32,6 +32,7 @@ const COLUMNS: [&str; 26] = [
     "wind_speed_m_s",
     "wind_speed_sd_m_s",
     "wind_toward_deg",
+    "wind_toward_sd_deg",
     "misfit",
 ];
 

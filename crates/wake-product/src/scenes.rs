@@ -102,13 +102,16 @@ impl<'a> Scenes<'a> {
         let mut scene = self.base.clone();
         scene.seed = seed;
         (scene.grid.rows, scene.grid.columns) = (lines.len(), pixels.len());
-        scene.grid.spacing = 0.5 * (axes.line_spacing + axes.pixel_spacing);
+        // Distances between places on the map would include the heights of the geolocation grid near coasts.
+        let annotation = sentinel(self.product)?.annotation();
+        let [down, across] = [annotation.azimuth_spacing, annotation.range_spacing];
+        scene.grid.spacing = 0.5 * (down + across);
         if let Some(incidence) = place.incidence {
             scene.radar.incidence = incidence;
         }
         if let Some(ratio) = self.product.range_to_velocity(line, pixel)? {
-            // Keep displacements in lines as in the product, whose line spacing differs slightly from its pixel spacing.
-            scene.radar.range_to_velocity = ratio * scene.grid.spacing / axes.line_spacing;
+            // Keep displacements in lines as in the product.
+            scene.radar.range_to_velocity = ratio * scene.grid.spacing / down;
         }
         scene.sea.wind_toward = in_scene(&axes, self.wind.toward);
         let spacing = scene.grid.spacing;

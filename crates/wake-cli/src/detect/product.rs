@@ -173,6 +173,7 @@ fn estimate(product: &Product, wakes: &mut [MappedWake]) -> Outcome<()> {
             wind_speed: wind[0],
             wind_speed_deviation: wind[1],
             wind_toward: found.wind_toward,
+            wind_toward_deviation: of(Value::WindToward)[1],
             misfit: found.estimate.misfit(),
         });
         bar.inc(1);

@@ -22,6 +22,11 @@ use std::f64::consts::TAU;
 /// Largest number of answers from which the likelihood is maximised.
 const CANDIDATES: usize = 4;
 
+/// Largest number of winds with which the wake is searched, and of those tried on the likeliest ship: where speckle hides the sea,
+/// winds of the same brightness along all axes are about equally likely (chosen).
+const SEARCHED: usize = 3;
+const TRIED: usize = 6;
+
 /// Fractions of the best answer's gain by which another answer may be worse and is still followed, for the part of the wake near
 /// the ship and for the whole wake, and difference of log-likelihood up to which no answer is dropped (chosen).
 const NEAR_WORSE: f64 = 0.5;
@@ -78,7 +83,10 @@ pub fn estimate(
     let observed = Observed::new(image.clone(), known, |i, j| echo.shown(i, j));
     let logarithmic = observed.logarithmic();
     let with_wind = |wind| WithWind::new(&logarithmic, known, wind, sighting);
-    let searches: Vec<WithWind<'_>> = likely(&winds, 45.0).into_iter().map(with_wind).collect();
+    let searches: Vec<WithWind<'_>> = likely(&winds, 45.0, SEARCHED)
+        .into_iter()
+        .map(with_wind)
+        .collect();
     let near = searches.iter().enumerate().map(|(n, one)| one.near_ship(n));
     let near = near.collect::<Result<Vec<_>>>()?.concat();
     // First from the answers near the ship, then from the best of all.
@@ -87,7 +95,7 @@ pub fn estimate(
     let best = apart(whole);
     let start = |answer: &Answer| searches[answer.search].start(&answer.found);
     let starts: Vec<Scene> = best.iter().map(start).collect();
-    let likely = likely(&winds, 25.0).into_iter();
+    let likely = likely(&winds, 25.0, TRIED).into_iter();
     let others: Vec<Sea> = likely.map(|wind| wind.open.sea.clone()).collect();
     let mut found = settled(&observed, &starts, &others, priors)?;
     let [speed, _] = found.of(Parameter::Value(Value::Speed));

@@ -91,6 +91,12 @@ impl Noise {
         by_sea / (by_sea + speckle)
     }
 
+    /// Variance of a pixel with the sea's variance multiplied by a factor.
+    pub(super) fn variance(&self, factor: f64) -> f32 {
+        let (sea, speckle) = (factor as f32 * self.sea[0], self.speckle[0]);
+        sea + (1.0 + sea) * speckle
+    }
+
     /// Covariance with the sea's variance multiplied by a factor.
     pub(super) fn covariance(&self, factor: f64) -> Field {
         let pairs = self.sea.iter().zip(&self.speckle);

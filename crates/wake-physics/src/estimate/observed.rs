@@ -47,6 +47,10 @@ const DARKEST: f32 = 0.03;
 /// Largest contrast of sources that adds noise; the higher contrast of darker pixels is clipped to it.
 const CONTRAST: f32 = 8.0;
 
+/// Least power of noise relative to its mean (chosen). Speckle that fills more than a pixel leaves almost no power at short
+/// wavelengths, where an image has the errors of its rounding to whole numbers instead.
+const LEAST_POWER: f32 = 1e-2;
+
 /// Number of rings of wavenumbers in which the fit is checked.
 pub(super) const RINGS: usize = 8;
 
@@ -140,8 +144,13 @@ impl Observed {
     /// Power of noise with a given covariance, in the window.
     pub(super) fn power(&self, covariance: &Field) -> Vec<f32> {
         let power = self.taper.power(&self.torus, covariance);
-        let floor = 1e-6 * power.iter().copied().fold(0.0, f32::max);
-        power.into_iter().map(|p| p.max(floor)).collect()
+        let least = self.least_power(covariance.values[0]);
+        power.into_iter().map(|p| p.max(least)).collect()
+    }
+
+    /// Least power of noise with a given variance, in the window.
+    fn least_power(&self, variance: f32) -> f32 {
+        LEAST_POWER * variance * self.taper.energy as f32
     }
 
     /// Score, information and likelihood.
@@ -178,12 +187,13 @@ impl Observed {
         let scales = mean.values.iter().zip(&spread.values).map(|(m, s)| m * s);
         let (information, of_power) = sums.information();
         let scale = sums.scale();
+        let least = self.least_power(texture.noise.variance(factors.texture));
         Near {
             score: sums.score(&left),
             log_likelihood: self.log_likelihood(scale, &left, &sums.power, gain, scales),
             information,
             of_power,
-            rings: self.rings(scale, &left, &sums.power),
+            rings: self.rings(scale, &left, &sums.power, least),
         }
     }
 
@@ -337,10 +347,11 @@ impl Observed {
         -0.5 * scale * spectrum - jacobian
     }
 
-    fn rings(&self, scale: f64, left: &Spectrum, power: &[f32]) -> Vec<[f64; 2]> {
+    /// - `least`: power at and below which wavenumbers do not count; a ring without others fits
+    fn rings(&self, scale: f64, left: &Spectrum, power: &[f32], least: f32) -> Vec<[f64; 2]> {
         let size = self.torus.size;
         let mut rings = vec![[0.0; 2]; RINGS];
-        for n in 0..left.len() {
+        for n in (0..left.len()).filter(|&n| power[n] > least) {
             let (i, j) = (n / size, n % size);
             let radius = (i as f64).hypot(j.min(size - j) as f64) / (0.5 * size as f64);
             let ring = &mut rings[((radius * RINGS as f64) as usize).min(RINGS - 1)];
@@ -349,7 +360,10 @@ impl Observed {
             ring[1] += weight;
         }
         for ring in &mut rings {
-            ring[0] /= ring[1].max(1e-9);
+            ring[0] = match ring[1] > 0.0 {
+                true => ring[0] / ring[1],
+                false => 1.0,
+            };
         }
         rings
     }

@@ -42,8 +42,10 @@ const PIXEL: Until = Until {
     farther: 0.25,
 };
 
-/// Drop in log-likelihood from the highest maximum beyond which a maximum is not followed further (chosen).
+/// Drop in log-likelihood from the highest maximum beyond which a maximum is not followed to other pixels, and number of maxima
+/// that are (chosen).
 const POSSIBLE: f64 = 300.0;
+const BY_PIXELS: usize = 5;
 
 /// Number of ships for which the wind is fitted.
 const FOLLOWED: usize = 2;
@@ -61,8 +63,8 @@ const AROUND: [[f64; 2]; 5] = [
 ///
 /// Fisher scoring maximises the likelihood from five starts around the guess, then again from the opposite wind and from places
 /// one pixel away. Standard deviations are those of the information times a factor for the error of the model (1.2 to 3.5,
-/// chosen). They also include the spread over other maxima, weighted by probability: values of ship and wind at places one pixel
-/// away, and values of the ship with another wind, which shifts the wake differently.
+/// chosen). They also include the spread over other maxima, weighted by probability: places one pixel away, and winds along other
+/// axes. Opposite winds count for the ship, whose wake they shift differently, and are listed as alternatives.
 ///
 /// The estimate is identifiable if the residual power is within 25 % and three standard deviations of the model's, the factors on
 /// brightness and texture agree with their priors (within 3 and 2 standard deviations of prior and estimate combined), the ship
@@ -184,13 +186,14 @@ pub(super) fn settled(
         let start = on_sea(&logarithmic, &scene, sea)?;
         points.push(ascent.climb(start, factors, END)?);
     }
-    let top = highest(&points);
-    let each = points
-        .into_iter()
-        .map(|point| match point.log_posterior > top - POSSIBLE {
+    sort(&mut points);
+    let least = highest(&points) - POSSIBLE;
+    let each = points.into_iter().enumerate().map(|(n, point)| {
+        match n < BY_PIXELS && point.log_posterior > least {
             true => ascent.over_pixels(point, PIXEL),
             false => Ok(vec![point]),
-        });
+        }
+    });
     let each = each.collect::<Result<Vec<_>>>()?;
     let mut points: Vec<Point> = each.into_iter().flatten().collect();
     sort(&mut points);

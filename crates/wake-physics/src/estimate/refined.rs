@@ -6,7 +6,7 @@ use super::parameter::Parameter;
 use super::priors::Priors;
 use super::value::Value;
 use crate::error::{Error, Result};
-use crate::measure::angle_between;
+use crate::measure::{angle_between, axis_between};
 use crate::raster::Field;
 use crate::scene::Scene;
 use serde::Serialize;
@@ -148,7 +148,10 @@ pub(super) fn concluded(ascent: &Ascent<'_>, points: Vec<Point>, open: f64) -> R
         }
         // Another wind moves the ship, and the ship can be a pixel farther.
         for other in beside.iter().chain(&others) {
-            let away = ascent.parameters.iter().map(|p| away(*p, &best, other));
+            let away = ascent
+                .parameters
+                .iter()
+                .map(|p| away(*p, &best.scene, &other.scene));
             let away: Vec<f64> = away.collect();
             for (n, value) in covariance.values.iter_mut().enumerate() {
                 *value += other.weight * away[n / count] * away[n % count];
@@ -206,25 +209,29 @@ fn normalise(others: &mut [Alternative]) -> f64 {
     total
 }
 
-/// Difference of a value at another maximum: for values of the ship if the speed is the same, for values of the wind if speed and
-/// wind are the same; 0 otherwise.
-fn away(parameter: Parameter, best: &Point, other: &Alternative) -> f64 {
-    let counts = match parameter.is_of_ship() {
-        true => !is_other_speed(&best.scene, &other.scene),
-        false => same(&best.scene, &other.scene),
-    };
+/// Difference of a value at another maximum, 0 if the speed of the ship differs there. Opposite winds are alternatives, so they
+/// do not add to the deviations of the wind; of directions of the wind, the axes are compared.
+fn away(parameter: Parameter, best: &Scene, other: &Scene) -> f64 {
     let value = match parameter {
         Parameter::Size => Value::Size,
         Parameter::Value(value) => value,
         Parameter::Gain | Parameter::Texture => return 0.0,
     };
-    match value {
-        _ if !counts => 0.0,
-        Value::Heading | Value::WindToward => {
-            angle_between(value.of(&other.scene), value.of(&best.scene))
-        }
-        _ => value.of(&other.scene) - value.of(&best.scene),
+    if is_other_speed(best, other) || !value.is_of_ship() && are_opposite(best, other) {
+        return 0.0;
     }
+    let [there, here] = [other, best].map(|scene| value.of(scene));
+    match value {
+        Value::Heading => angle_between(there, here),
+        Value::WindToward => axis_between(there, here),
+        _ => there - here,
+    }
+}
+
+/// Whether the winds of two scenes are opposite.
+fn are_opposite(a: &Scene, b: &Scene) -> bool {
+    let [a, b] = [a, b].map(|scene| scene.sea.wind_toward);
+    angle_between(a, b).abs() > 90.0 && axis_between(a, b).abs() < SAME_WIND
 }
 
 /// Tests of [`refine`](super::refine).
@@ -267,6 +274,9 @@ fn wrapped(scene: &Scene) -> Scene {
 const SAME_SPEED: f64 = 0.005;
 const OTHER_SPEED: f64 = 0.02;
 
+/// Difference of two winds' directions below which they are the same \[deg\].
+const SAME_WIND: f64 = 20.0;
+
 fn is_other_speed(a: &Scene, b: &Scene) -> bool {
     (Value::Speed.of(a) / Value::Speed.of(b)).ln().abs() > OTHER_SPEED
 }
@@ -275,5 +285,37 @@ fn is_other_speed(a: &Scene, b: &Scene) -> bool {
 fn same(a: &Scene, b: &Scene) -> bool {
     let speed = (Value::Speed.of(a) / Value::Speed.of(b)).ln().abs();
     let turned = angle_between(a.sea.wind_toward, b.sea.wind_toward);
-    speed < SAME_SPEED && turned.abs() < 20.0
+    speed < SAME_SPEED && turned.abs() < SAME_WIND
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Winds along other axes add to the deviation of the wind, opposite winds and other speeds of the ship do not.
+    #[test]
+    fn winds_along_other_axes_are_away() {
+        let [speed, toward] = [Value::WindSpeed, Value::WindToward].map(Parameter::Value);
+        let scene = |wind: f64, to: f64, ship: f64| {
+            let mut scene = Scene::default();
+            (scene.sea.wind_speed, scene.sea.wind_toward) = (wind, to);
+            scene.ships[0].speed = ship;
+            scene
+        };
+        let best = scene(5.0, 350.0, 8.0);
+        for (other, expected) in [
+            (scene(7.0, 100.0, 8.0), [2.0, -70.0]),
+            (scene(7.0, 10.0, 8.0), [2.0, 20.0]),
+            (scene(7.0, 175.0, 8.0), [0.0, 0.0]),
+            (scene(7.0, 100.0, 9.0), [0.0, 0.0]),
+        ] {
+            assert_eq!([speed, toward].map(|p| away(p, &best, &other)), expected);
+        }
+        let turned = away(
+            Parameter::Value(Value::Speed),
+            &best,
+            &scene(5.0, 175.0, 8.1),
+        );
+        assert!((turned - 0.1).abs() < 1e-9);
+    }
 }

@@ -4,7 +4,7 @@ use super::expected::ExpectedImage;
 use super::noise::Noise;
 use super::observed::Observed;
 use crate::error::Result;
-use crate::measure::{axis_between, mean_sigma0};
+use crate::measure::{axis_between, mean_intensity};
 use crate::numeric::root;
 use crate::raster::Field;
 use crate::scene::Scene;
@@ -27,18 +27,17 @@ pub(super) struct Wind {
     pub(super) log_likelihood: f64,
 }
 
-/// Drop in log-likelihood from the likeliest wind beyond which a wind is not followed, and number of winds followed (chosen).
+/// Drop in log-likelihood from the likeliest wind beyond which a wind is not followed (chosen).
 const HOPELESS: f64 = 100.0;
-const FOLLOWED: usize = 3;
 
-/// Likeliest winds whose axes are at least `apart` degrees apart, as opposite winds make almost the same wake.
-pub(super) fn likely(winds: &[Wind], apart: f64) -> Vec<&Wind> {
+/// The `most` likeliest winds whose axes are at least `apart` degrees apart, as opposite winds make almost the same wake.
+pub(super) fn likely(winds: &[Wind], apart: f64, most: usize) -> Vec<&Wind> {
     let mut kept: Vec<&Wind> = Vec::new();
     for wind in winds {
         let hopeless = wind.log_likelihood < winds[0].log_likelihood - HOPELESS;
         let toward = wind.open.sea.wind_toward;
         let near = |w: &&Wind| axis_between(w.open.sea.wind_toward, toward).abs() < apart;
-        if kept.len() < FOLLOWED && !hopeless && !kept.iter().any(near) {
+        if kept.len() < most && !hopeless && !kept.iter().any(near) {
             kept.push(wind);
         }
     }
@@ -84,7 +83,7 @@ fn as_bright(scene: &Scene, bright: f64) -> Result<f64> {
     let over = |speed: f64| {
         let mut scene = scene.clone();
         scene.sea.wind_speed = speed;
-        mean_sigma0(&scene).map_or(f64::NAN, |sigma0| sigma0 - bright)
+        mean_intensity(&scene) - bright
     };
     let off = SPEEDS.map(over);
     let crossed = (1..SPEEDS.len())
@@ -95,4 +94,39 @@ fn as_bright(scene: &Scene, bright: f64) -> Result<f64> {
     }
     let nearest = (0..SPEEDS.len()).min_by(|&a, &b| off[a].abs().total_cmp(&off[b].abs()));
     Ok(nearest.map_or(SPEEDS[0], |n| SPEEDS[n]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Thermal noise half as bright as the sea: the wind toward the true direction keeps its speed.
+    #[test]
+    fn noise_is_not_wind() {
+        let keys = [
+            "grid.rows=64",
+            "grid.columns=64",
+            "sea.wind_speed=6",
+            "model.tolerance=1e-2",
+        ];
+        let mut sea = Scene::default().with_assignments(&keys).unwrap();
+        sea.ships.clear();
+        let clear = ExpectedImage::new(&sea, &[])
+            .unwrap()
+            .intensity(&sea)
+            .unwrap();
+        sea.radar.nesz = Some(10.0 * (0.5 * clear.mean()).log10());
+        let noisy = ExpectedImage::new(&sea, &[])
+            .unwrap()
+            .intensity(&sea)
+            .unwrap();
+        assert!((noisy.mean() / clear.mean() - 1.5).abs() < 1e-3);
+        let bright = noisy.mean();
+        let observed = Observed::new(noisy, &sea, |_, _| 1.0);
+        let winds = winds(&observed, &sea, Some([bright, 0.03])).unwrap();
+        let same = |wind: &&Wind| wind.open.sea.wind_toward == sea.sea.wind_toward;
+        let found = winds.iter().find(same).unwrap().open.sea.wind_speed;
+        // The mean cross-section has two digits: 0.1 dB, some 0.1 m/s. Noise taken for wind would be 1.8 dB.
+        assert!((found - 6.0).abs() < 0.2, "{found}");
+    }
 }

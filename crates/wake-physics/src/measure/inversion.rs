@@ -4,6 +4,7 @@
 //! generated image or the scene of a simulated image: is the image as bright as the sea under *this* wind at *this* incidence?
 
 use super::{Measured, OpenSea};
+use crate::effects::Effects;
 use crate::models::Models;
 use crate::raster::Raster;
 use crate::scattering::SlopeCovariance;
@@ -40,7 +41,7 @@ impl Lattice {
     }
 }
 
-/// Mean cross-section of the sea of a scene, without its ship.
+/// Mean cross-section of the waves of a scene's sea, without breaking, noise and ships.
 ///
 /// ```text
 /// ⟨σ⁰⟩ = ∬ σ⁰(s) p(s) ds,    p the Gaussian density of all slopes from the longest wave to the radar's
@@ -53,11 +54,17 @@ impl Lattice {
 /// A value of the scene out of its range.
 pub fn mean_sigma0(scene: &Scene) -> crate::Result<f64> {
     scene.validate()?;
-    Ok(brightness(scene))
+    Ok(cross_section(&Models::new(scene)))
 }
 
-fn brightness(scene: &Scene) -> f64 {
+/// Mean intensity of a scene's sea, without its ship: waves, breaking and noise \[1\].
+pub(crate) fn mean_intensity(scene: &Scene) -> f64 {
     let models = Models::new(scene);
+    let [breaking, noise] = Effects::new(scene, &models).added();
+    cross_section(&models) + breaking + noise
+}
+
+fn cross_section(models: &Models) -> f64 {
     let band = Raster::nyquist_wavenumber(&models.pixels.image);
     let moments = models.sea.moments(0.0, band, models.incidence);
     let resolved = SlopeCovariance {
@@ -183,7 +190,7 @@ fn curve(scene: &Scene, lattice: &Lattice, set: impl Fn(&mut Scene, f64)) -> Vec
         .values()
         .map(|value| {
             set(&mut scene, value);
-            (value, 10.0 * brightness(&scene).log10())
+            (value, 10.0 * mean_intensity(&scene).log10())
         })
         .collect()
 }

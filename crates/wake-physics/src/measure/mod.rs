@@ -28,6 +28,7 @@ mod wake;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use inversion::mean_intensity;
 pub use inversion::{fetch, incidence, mean_sigma0, wind_axis, wind_speed};
 pub use median::median;
 pub use open_sea::{OpenSea, open_sea};

@@ -209,6 +209,11 @@ fn brightness_moves_the_measurements_the_right_way() {
     assert!(incidences[0] > incidences[1] && incidences[1] > incidences[2]);
     // The lattice is interpolated linearly in decibel: half a step of it at worst.
     assert!((winds[1] - 5.0).abs() < 0.05 && (incidences[1] - 30.0).abs() < 0.05);
+    // Noise as strong as the sea brightens the image, not the wind.
+    let mut noisy = truth.clone();
+    noisy.radar.nesz = Some(10.0 * expected.log10());
+    let [wind, incidence] = [wind_speed, incidence].map(|of| of(&sea(2.0), &noisy).unwrap().value);
+    assert!((wind - 5.0).abs() < 0.05 && (incidence - 30.0).abs() < 0.05);
     // A sea ten times too bright has no such wind.
     assert!(!wind_speed(&sea(10.0), &truth).unwrap().measurable);
 }
