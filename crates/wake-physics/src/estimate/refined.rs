@@ -309,7 +309,10 @@ mod tests {
             (scene(7.0, 175.0, 8.0), [0.0, 0.0]),
             (scene(7.0, 100.0, 9.0), [0.0, 0.0]),
         ] {
-            assert_eq!([speed, toward].map(|p| away(p, &best, &other)), expected);
+            for (parameter, expected) in [speed, toward].into_iter().zip(expected) {
+                let found = away(parameter, &best, &other);
+                assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+            }
         }
         let turned = away(
             Parameter::Value(Value::Speed),
