@@ -30,7 +30,7 @@ pub struct MappedEstimate {
 /// Estimates ship and wind around a wake of a Sentinel-1 product.
 ///
 /// Uses σ⁰ of at most 128 × 128 pixels around the wake, with thermal noise added back; pixels darker than the noise count as
-/// noise. The radar is taken from the annotation, the water is deep, and the hull form is the default scene's.
+/// noise. Radar and pixel spacing are taken from the annotation, the water is deep, and the hull form is the default scene's.
 ///
 /// - `tip`: line and pixel of the wake's tip
 /// - `heading`: heading of the ship, clockwise from true north \[degrees\], accurate to some 7 degrees

@@ -393,7 +393,7 @@ pub(super) fn sort(points: &mut [Point]) {
 }
 
 /// Highest log-posterior.
-pub(super) fn highest(points: &[Point]) -> f64 {
+fn highest(points: &[Point]) -> f64 {
     let each = points.iter().map(|point| point.log_posterior);
     each.fold(f64::NEG_INFINITY, f64::max)
 }

@@ -65,7 +65,7 @@ pub struct Score {
     /// Variance V of the score, row after row; the covariance of an estimate is J⁻¹VJ⁻¹.
     pub variance: Vec<f64>,
     /// Power of the residual over its expectation in rings of wavenumbers, longest waves first; 1 where the scene explains the
-    /// image.
+    /// image. Wavelengths at which noise has less than a hundredth of its mean power are left out; 1 in a ring of such.
     pub power: Vec<f64>,
 }
 

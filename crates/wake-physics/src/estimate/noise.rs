@@ -93,15 +93,13 @@ impl Noise {
 
     /// Variance of a pixel with the sea's variance multiplied by a factor.
     pub(super) fn variance(&self, factor: f64) -> f32 {
-        let (sea, speckle) = (factor as f32 * self.sea[0], self.speckle[0]);
-        sea + (1.0 + sea) * speckle
+        together(factor, self.sea[0], self.speckle[0])
     }
 
     /// Covariance with the sea's variance multiplied by a factor.
     pub(super) fn covariance(&self, factor: f64) -> Field {
         let pairs = self.sea.iter().zip(&self.speckle);
-        let factor = factor as f32;
-        self.field(pairs.map(|(sea, speckle)| factor * sea + (1.0 + factor * sea) * speckle))
+        self.field(pairs.map(|(&sea, &speckle)| together(factor, sea, speckle)))
     }
 
     /// Derivative of the covariance by the logarithm of the factor.
@@ -118,6 +116,12 @@ impl Noise {
             values: values.collect(),
         }
     }
+}
+
+/// Covariance of sea and speckle at one distance, the sea's multiplied by a factor.
+fn together(factor: f64, sea: f32, speckle: f32) -> f32 {
+    let sea = factor as f32 * sea;
+    sea + (1.0 + sea) * speckle
 }
 
 /// Correlation of the speckle's intensity by distance along rows (first axis: azimuth) and columns.

@@ -1,6 +1,6 @@
 //! Maximum-likelihood estimate near a guess: ascents from several starts to the highest maximum.
 
-use super::ascent::{Ascent, Point, Until, highest, sort};
+use super::ascent::{Ascent, Point, Until, sort};
 use super::echo::Echo;
 use super::expected::ExpectedImage;
 use super::noise::Noise;
@@ -187,7 +187,7 @@ pub(super) fn settled(
         points.push(ascent.climb(start, factors, END)?);
     }
     sort(&mut points);
-    let least = highest(&points) - POSSIBLE;
+    let least = points[0].log_posterior - POSSIBLE;
     let each = points.into_iter().enumerate().map(|(n, point)| {
         match n < BY_PIXELS && point.log_posterior > least {
             true => ascent.over_pixels(point, PIXEL),

@@ -50,7 +50,8 @@ pub struct Estimate {
     pub log_likelihood: f64,
     /// Log-likelihood ratio to the best sea without the ship.
     pub over_open_sea: f64,
-    /// Power of the residual over its expectation in rings of wavenumbers, longest waves first; 1 for a perfect model.
+    /// Power of the residual over its expectation in rings of wavenumbers, longest waves first; 1 for a perfect model. As
+    /// [`Score::power`](super::Score::power).
     pub power: Vec<f64>,
     /// Velocity of the ship toward the radar and its standard deviation [m/s], from the displacement of its echo alone; used by
     /// [`estimate`](super::estimate).
@@ -228,7 +229,7 @@ fn away(parameter: Parameter, best: &Scene, other: &Scene) -> f64 {
     }
 }
 
-/// Whether the winds of two scenes are opposite.
+/// True if the winds of two scenes are opposite.
 fn are_opposite(a: &Scene, b: &Scene) -> bool {
     let [a, b] = [a, b].map(|scene| scene.sea.wind_toward);
     angle_between(a, b).abs() > 90.0 && axis_between(a, b).abs() < SAME_WIND
