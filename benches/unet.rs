@@ -20,6 +20,7 @@ use burn::tensor::{Device, Distribution, Tensor};
 use criterion::{Criterion, criterion_group};
 use wake_ldm::unet::{UNet, UNetConfig, UNetInput};
 use wake_nn::attention::attention;
+use wake_nn::on_pool;
 use wake_nn::resnet::{ResnetBlock, ResnetShape};
 
 fn random<const D: usize>(shape: [usize; D], device: &Device) -> Tensor<D> {
@@ -76,8 +77,11 @@ fn input(config: &UNetConfig, batch: usize, size: usize, device: &Device) -> UNe
     }
 }
 
+/// As the pipelines call it.
 fn call(unet: &UNet, input: &UNetInput) {
-    black_box(unet.forward(input.clone()).into_data());
+    on_pool(&Device::flex(), || {
+        black_box(unet.forward(input.clone()).into_data());
+    });
 }
 
 /// The small U-Net on 32 × 32 latents.
@@ -93,10 +97,16 @@ fn small_unet(criterion: &mut Criterion) {
     }
 }
 
+/// As the training loop makes its steps.
+#[cfg(feature = "train")]
+fn report(name: &str, call: impl Fn() + Send) {
+    on_pool(&Device::flex(), move || report_here(name, call));
+}
+
 /// Prints the median seconds of seven calls after one to warm up, and the mean of the seconds that all
 /// cores together worked on one, which a busy machine does not change.
 #[cfg(feature = "train")]
-fn report(name: &str, call: impl Fn()) {
+fn report_here(name: &str, call: impl Fn()) {
     call();
     let busy = cpu_seconds();
     let timed = |_| {

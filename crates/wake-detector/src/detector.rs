@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use burn::tensor::{Device, Tensor, TensorData};
-use wake_nn::check_range;
 use wake_nn::weights::{Layout, load, load_bytes};
+use wake_nn::{check_range, on_pool};
 use whole_files::{checksum, file_checksum};
 
 use crate::calibration::{Calibration, Probabilities};
@@ -213,10 +213,10 @@ impl Detector {
 impl Mapper for Detector {
     fn maps(&self, inputs: Vec<f32>, rows: usize, columns: usize) -> Maps {
         let inputs = TensorData::new(inputs, [1, INPUTS, rows, columns]);
-        let maps = self
-            .network
-            .forward(Tensor::from_data(inputs, &self.device));
-        let values = maps.into_data();
+        let values = on_pool(&self.device, || {
+            let inputs = Tensor::from_data(inputs, &self.device);
+            self.network.forward(inputs).into_data()
+        });
         let values = match values.try_to_vec::<f32>() {
             Ok(values) => values,
             // Half precision.

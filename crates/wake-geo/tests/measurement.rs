@@ -58,6 +58,44 @@ fn windows_are_calibrated_in_folders_and_archives() {
 }
 
 #[test]
+fn intensity_keeps_the_noise_and_the_pixels_below_it() {
+    let (_kept, safe) = common::folder_of(NAME, &files());
+    let product = Product::open(&safe).expect("a product");
+    let sentinel = product.sentinel1().expect("Sentinel-1");
+    let (lines, pixels) = (5..60, 50..71);
+    let window = sentinel
+        .read_intensity(lines.clone(), pixels.clone())
+        .expect("a window");
+    let without = product
+        .read_window(lines.clone(), pixels.clone())
+        .expect("a window");
+    assert_eq!((window.no_data, window.below_noise), (without.no_data, 0));
+    assert!(without.below_noise > 0);
+    for (i, line) in lines.enumerate() {
+        for (&value, pixel) in window.line(i).iter().zip(pixels.clone()) {
+            let digital = f64::from(number(line, pixel));
+            let a = sentinel
+                .calibration(line as f64, pixel as f64)
+                .sigma_nought_lut;
+            match digital > 0.0 {
+                // The square, the table's 32 bits and the division: a few roundings.
+                true => {
+                    let exact = (digital / a).powi(2);
+                    let rounding = 8.0 * f64::from(f32::EPSILON) * exact;
+                    assert!(
+                        (f64::from(value) - exact).abs() < rounding,
+                        "{line} {pixel}"
+                    );
+                }
+                false => assert!(value.is_nan()),
+            }
+        }
+    }
+    let error = sentinel.read_intensity(0..LINES + 1, 0..PIXELS);
+    assert!(matches!(error, Err(wake_geo::Error::Window { .. })));
+}
+
+#[test]
 fn noise_that_the_processor_removed_is_not_removed_again() {
     let mut files = files();
     let text = String::from_utf8(files[0].1.clone()).expect("text");

@@ -126,6 +126,19 @@ pub fn is_cpu(device: &Device) -> bool {
     cpus.contains(device)
 }
 
+/// Runs `work` on a thread of rayon's pool if the device is a CPU. From other threads, each kernel of a network would wait for a
+/// thread of the pool to wake up, which takes a tenth of a small network's training step. On a GPU `work` runs on this thread,
+/// since burn orders the work of GPUs by threads.
+///
+/// Several threads that wait for one another must not use this at once: together they may occupy the whole pool.
+#[doc(hidden)]
+pub fn on_pool<R: Send>(device: &Device, work: impl FnOnce() -> R + Send) -> R {
+    match is_cpu(device) {
+        true => rayon::scope(|_| work()),
+        false => work(),
+    }
+}
+
 #[cfg(all(test, feature = "flex"))]
 mod tests {
     use super::*;

@@ -55,7 +55,7 @@ pub mod self_check;
 #[cfg(feature = "burn")]
 pub use burn;
 #[cfg(feature = "burn")]
-pub use device::{device_label, device_named, is_cpu};
+pub use device::{device_label, device_named, is_cpu, on_pool};
 pub use error::{Error, Mismatch, Misshapen, Result, check_range};
 #[cfg(feature = "burn")]
 pub use numbers::{cast_to, check_finite, is_half};

@@ -60,7 +60,8 @@ pub fn estimate_wake(product: &Product, tip: [f64; 2], heading: f64) -> Result<M
     let (lines, pixels) = (part(tip[0], cos, lines), part(tip[1], sin, pixels));
     let mut known = scenes.scene(&lines, &pixels, 0)?;
     let (image, noise) = with_noise(product, sentinel, &lines, &pixels)?;
-    known.radar.nesz = Some(10.0 * noise.log10());
+    // Without noise where the processor has removed it.
+    known.radar.nesz = (noise > 0.0).then(|| 10.0 * noise.log10());
     known.ships = vec![Ship::default()];
     let place = in_part(known.grid.spacing, (&lines, &pixels), tip);
     let sighting = Sighting::new(place, turned);
@@ -80,8 +81,8 @@ fn with_noise(
     lines: &Range<usize>,
     pixels: &Range<usize>,
 ) -> Result<(Field, f64)> {
-    let window = product.read_window(lines.clone(), pixels.clone())?;
-    if window.no_data > 0 || !window.values.iter().all(|v| v.is_finite()) {
+    let window = sentinel.read_intensity(lines.clone(), pixels.clone())?;
+    if window.no_data > 0 {
         return Err(Error::Template {
             path: product.path().to_owned(),
             why: format!(
@@ -90,16 +91,13 @@ fn with_noise(
         });
     }
     let mut values = Vec::with_capacity(window.values.len());
-    let mut sum = 0.0;
+    let mut noise = 0.0;
     for (n, line) in lines.clone().enumerate().rev() {
-        for (pixel, sigma0) in pixels.clone().zip(window.line(n)) {
-            let calibration = sentinel.calibration(line as f64, pixel as f64);
-            let noise = calibration.noise / calibration.sigma_nought_lut.powi(2);
-            sum += noise;
-            values.push(sigma0 + noise as f32);
-        }
+        values.extend_from_slice(window.line(n));
+        let of = |pixel| sentinel.noise_equivalent_sigma_nought(line as f64, pixel as f64);
+        noise += pixels.clone().map(of).sum::<f64>();
     }
-    let noise = sum / values.len() as f64;
+    noise /= values.len() as f64;
     let field = Field {
         rows: lines.len(),
         columns: pixels.len(),

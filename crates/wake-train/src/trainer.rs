@@ -8,7 +8,7 @@ use super::checkpoint::{Checkpoint, Tensors};
 use super::optimizer::{AdamOptions, LrSchedule, Optimizer};
 use super::tensors::{changed, gradients, names, replaced, rounded, values};
 use crate::error::{Error, Result};
-use wake_nn::check_range;
+use wake_nn::{check_range, on_pool};
 
 /// Groups of a checkpoint's tensors, in the order of [`Trainer::state`].
 const GROUPS: [&str; 4] = ["weights", "average", "first", "second"];
@@ -195,7 +195,18 @@ impl<M: Module> Trainer<M> {
         &mut self,
         loss: impl Fn(&M, &Device, usize) -> Tensor<1> + Sync,
     ) -> StepReport {
-        let (gradients, loss) = self.gradients(&loss);
+        match self.devices.as_slice() {
+            [device] => on_pool(&device.clone().inner(), || self.step_here(&loss)),
+            // Threads of several devices share the pool, so this one stays outside.
+            _ => self.step_here(&loss),
+        }
+    }
+
+    fn step_here(
+        &mut self,
+        loss: &(impl Fn(&M, &Device, usize) -> Tensor<1> + Sync),
+    ) -> StepReport {
+        let (gradients, loss) = self.gradients(loss);
         let norm = global_norm(&gradients);
         let rate = self.options.rate.at(self.step);
         let applied = norm.is_finite() && loss.is_finite();

@@ -26,7 +26,7 @@ use sigma::{Calibrator, sigma_nought};
 use crate::error::{Error, Result};
 use crate::geotiff::{GeoTiff, SampleType};
 use crate::limits::MEASUREMENT_EXTRA_BYTES;
-use crate::window::Window;
+use crate::window::{Window, check_window};
 use crate::xml::Document;
 use whole_files::sentence;
 
@@ -160,6 +160,23 @@ impl Sentinel1 {
         measurement.read(lines, pixels, out)
     }
 
+    /// Reads the intensity DN² / A² of a window: σ⁰ plus thermal noise. Unlike σ⁰ plus
+    /// [`Sentinel1::noise_equivalent_sigma_nought`], it keeps pixels below the noise as they are, and the statistics of speckle.
+    ///
+    /// # Errors
+    /// As [`Product::read_window`](crate::Product::read_window).
+    pub fn read_intensity(&self, lines: Range<usize>, pixels: Range<usize>) -> Result<Window> {
+        check_window(
+            &lines,
+            &pixels,
+            (self.annotation.lines, self.annotation.pixels),
+        )?;
+        let mut window = Window::default();
+        window.start(lines.len(), pixels.len());
+        self.read_calibrated(None, lines, pixels, &mut window)?;
+        Ok(window)
+    }
+
     /// Reads σ⁰ of a window inside the image; `window` has the right size.
     pub(crate) fn read_window(
         &self,
@@ -167,9 +184,19 @@ impl Sentinel1 {
         pixels: Range<usize>,
         window: &mut Window,
     ) -> Result<()> {
+        self.read_calibrated(self.noise.as_ref(), lines, pixels, window)
+    }
+
+    fn read_calibrated(
+        &self,
+        noise: Option<&Noise>,
+        lines: Range<usize>,
+        pixels: Range<usize>,
+        window: &mut Window,
+    ) -> Result<()> {
         self.digital_numbers(lines.clone(), pixels.clone(), &mut window.values)?;
         let rows = window.values.chunks_exact_mut(pixels.len());
-        let mut calibrator = Calibrator::new(&self.calibration, self.noise.as_ref(), pixels);
+        let mut calibrator = Calibrator::new(&self.calibration, noise, pixels);
         for (line, row) in lines.zip(rows) {
             let counts = calibrator.apply(line, row);
             window.no_data += counts.no_data;

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::silu::sigmoid;
 use super::sum::{product_sum, sum};
+use crate::kernels::zeros;
 
 /// Sizes and options of a normalisation.
 #[derive(Debug, Clone, Copy)]
@@ -47,7 +48,7 @@ pub(crate) type Moments = Vec<[f32; 2]>;
 /// - `parameters`: weight and bias, `[channels]` each
 /// - result: as `x`, and the moments `[batch · groups]`
 pub(crate) fn normalize(x: &[f32], parameters: [&[f32]; 2], shape: &Shape) -> (Vec<f32>, Moments) {
-    let mut y = vec![0.0; x.len()];
+    let mut y = zeros(x.len());
     let arch = Arch::new();
     let moments = y
         .par_chunks_mut(shape.group())
@@ -117,7 +118,7 @@ pub(crate) fn gradients(
     moments: &[[f32; 2]],
     shape: &Shape,
 ) -> [Vec<f32>; 3] {
-    let mut dx = vec![0.0; x.len()];
+    let mut dx = zeros(x.len());
     let mut partial = vec![[0.0; 2]; x.len() / shape.pixels];
     let arch = Arch::new();
     dx.par_chunks_mut(shape.group())

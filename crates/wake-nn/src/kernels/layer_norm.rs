@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::arch::arch;
 use super::sum::{product_sum, sum};
+use crate::kernels::zeros;
 
 /// Elements that one core processes at a time.
 const PART: usize = 1 << 14;
@@ -27,7 +28,7 @@ pub(crate) type Moments = Vec<[f32; 2]>;
 pub(crate) fn normalize(x: &[f32], parameters: [&[f32]; 2], epsilon: f32) -> (Vec<f32>, Moments) {
     let channels = parameters[0].len();
     let tokens = (PART / channels).max(1);
-    let mut y = vec![0.0; x.len()];
+    let mut y = zeros(x.len());
     let mut moments = vec![[0.0; 2]; x.len() / channels];
     let arch = arch();
     y.par_chunks_mut(tokens * channels)
@@ -88,7 +89,7 @@ impl WithSimd for Forward<'_> {
 pub(crate) fn to_input(x: &[f32], dy: &[f32], weight: &[f32], moments: &[[f32; 2]]) -> Vec<f32> {
     let channels = weight.len();
     let tokens = (PART / channels).max(1);
-    let mut dx = vec![0.0; x.len()];
+    let mut dx = zeros(x.len());
     let arch = arch();
     dx.par_chunks_mut(tokens * channels)
         .zip(x.par_chunks(tokens * channels))

@@ -3,6 +3,8 @@
 //! Every task computes some rows and columns of a product, one stretch of the depth at a time: its columns of the right
 //! factor are packed by tiles, which stay in a core's L2 cache, and rows of the left factor are read in place.
 
+use std::ops::Range;
+
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
@@ -10,11 +12,14 @@ use super::arch::arch;
 use super::columns::columns;
 use super::product::Rows;
 use super::tile::{self, ROWS};
+use crate::kernels::zeros;
 
 /// Rows multiplied with one tile of the right factor before the next, a multiple of a tile's rows.
 const BLOCK: usize = 8 * ROWS;
-/// Numbers of a row that are multiplied at a time: a tile takes 24 KiB with the widest vectors.
-const DEPTH: usize = 192;
+/// Vectors of a tile with 32 registers of 16 numbers, of which the sums fill 24; other machines have tiles of two vectors.
+const WIDE: usize = 4;
+/// Numbers of a row that are multiplied at a time: a tile takes at most 32 KiB.
+const DEPTH: usize = 128;
 /// Columns that one core multiplies or sums at a time.
 const COLUMNS: usize = 128;
 
@@ -70,7 +75,7 @@ pub(crate) fn to_bias(gradient: &[f32], to: usize) -> Vec<f32> {
 
 /// Transposes a matrix `[rows, columns]` to `[columns, rows]`.
 fn transposed(matrix: &[f32], rows: usize, columns: usize) -> Vec<f32> {
-    let mut out = vec![0.0; matrix.len()];
+    let mut out = zeros(matrix.len());
     out.par_chunks_mut(rows * ROWS)
         .enumerate()
         .for_each(|(n, out)| {
@@ -101,7 +106,7 @@ fn product(left: &[f32], right: Factor<'_>, bias: Option<&[f32]>, sizes: [usize;
     // Every task packs its columns again: take as many rows per task as leave four tasks per core.
     let shares = (4 * rayon::current_num_threads()).div_ceil(wide.div_ceil(COLUMNS));
     let many = rows.div_ceil(shares).next_multiple_of(BLOCK);
-    let mut out = vec![0.0; rows * wide];
+    let mut out = zeros(rows * wide);
     columns(&mut out, wide, COLUMNS)
         .par_iter_mut()
         .enumerate()
@@ -137,8 +142,19 @@ impl WithSimd for Task<'_, '_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(mut self, simd: S) {
-        let (width, depth) = (tile::width::<S>(), self.sizes[1]);
+    fn with_simd<S: Simd>(self, simd: S) {
+        match S::REGISTER_COUNT {
+            32.. => self.run::<S, WIDE>(simd),
+            _ => self.run::<S, 2>(simd),
+        }
+    }
+}
+
+impl Task<'_, '_> {
+    /// Computes the product with tiles of V vectors.
+    #[inline(always)]
+    fn run<S: Simd, const V: usize>(mut self, simd: S) {
+        let (width, depth) = (V * S::F32_LANES, self.sizes[1]);
         let tiles = self.out[0].len().div_ceil(width);
         let mut packed = vec![0.0; tiles * DEPTH.min(depth) * width];
         for first in (0..depth).step_by(DEPTH) {
@@ -148,15 +164,13 @@ impl WithSimd for Task<'_, '_> {
             for row in (0..self.out.len()).step_by(BLOCK) {
                 for (tile, panel) in packed.chunks_exact(count * width).enumerate() {
                     for row in (row..self.out.len().min(row + BLOCK)).step_by(ROWS) {
-                        self.multiply(simd, [row, first, tile], panel);
+                        self.multiply::<S, V>(simd, [row, first, tile], panel);
                     }
                 }
             }
         }
     }
-}
 
-impl Task<'_, '_> {
     /// Packs a stretch of the depth of this task's columns of the right factor: `[tile, depth, column]`.
     fn pack(&self, first: usize, count: usize, width: usize, packed: &mut [f32]) {
         let [_, depth, columns] = self.sizes;
@@ -181,27 +195,54 @@ impl Task<'_, '_> {
 
     /// Adds the product of six rows and one tile over a stretch of the depth, beginning at `first`.
     #[inline(always)]
-    fn multiply<S: Simd>(&mut self, simd: S, [row, first, tile]: [usize; 3], panel: &[f32]) {
-        let width = tile::width::<S>();
-        let depth = self.sizes[1];
-        let count = panel.len() / width;
+    fn multiply<S: Simd, const V: usize>(
+        &mut self,
+        simd: S,
+        [row, first, tile]: [usize; 3],
+        panel: &[f32],
+    ) {
+        let (width, depth) = (V * S::F32_LANES, self.sizes[1]);
         let of_tile = tile * width..self.out[0].len().min((tile + 1) * width);
         let end = self.out.len().min(row + ROWS);
+        let (top, last) = (self.first[0] + row, self.first[0] + end - 1);
+        let count = panel.len() / width;
+        let of = |i: usize| &self.left[(top + i).min(last) * depth + first..][..count];
+        let factors = (std::array::from_fn(of), panel);
+        let is_first = first == 0;
+        let begin = self.bias.filter(|_| is_first);
+        let begin = begin.map(|bias| &bias[self.first[1]..][of_tile.clone()]);
         let out = &mut self.out[row..end];
-        let mut sums = tile::start(simd, [0.0; ROWS]);
-        for (sum, out) in sums.iter_mut().zip(&*out) {
-            *sum = match self.bias {
-                _ if first > 0 => tile::load(simd, &out[of_tile.clone()]),
-                Some(bias) => tile::load(simd, &bias[self.first[1]..][of_tile.clone()]),
-                None => *sum,
-            };
+        match out.first_chunk_mut::<ROWS>() {
+            // Sums of a known number of rows stay in registers.
+            Some(out) => add::<S, V>(simd, factors, begin, is_first, &mut out[..], of_tile),
+            None => add::<S, V>(simd, factors, begin, is_first, out, of_tile),
         }
-        let (row, last) = (self.first[0] + row, self.first[0] + end - 1);
-        let of = |i: usize| &self.left[(row + i).min(last) * depth + first..][..count];
-        tile::multiply(simd, std::array::from_fn(of), 0, panel, &mut sums);
-        for (sum, out) in sums.into_iter().zip(out) {
-            tile::store::<S>(sum, &mut out[of_tile.clone()]);
-        }
+    }
+}
+
+/// Adds the product of some rows and a panel to their numbers in the columns `of_tile`.
+///
+/// - `begin`: what the sums begin with; without it they continue from `out`, or begin with 0 in the first stretch of the depth
+#[inline(always)]
+fn add<S: Simd, const V: usize>(
+    simd: S,
+    (rows, panel): ([&[f32]; ROWS], &[f32]),
+    begin: Option<&[f32]>,
+    is_first: bool,
+    out: &mut [&mut [f32]],
+    of_tile: Range<usize>,
+) {
+    let mut sums = [[simd.splat_f32s(0.0); V]; ROWS];
+    for (sum, out) in sums.iter_mut().zip(&*out) {
+        *sum = match begin {
+            Some(begin) => tile::load(simd, begin),
+            None if is_first => *sum,
+            None => tile::load(simd, &out[of_tile.clone()]),
+        };
+    }
+    tile::multiply(simd, rows, 0, panel, &mut sums);
+    for (sum, out) in sums.into_iter().zip(out) {
+        tile::store::<S, V>(sum, &mut out[of_tile.clone()]);
     }
 }
 

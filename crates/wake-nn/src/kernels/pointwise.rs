@@ -4,6 +4,7 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::silu::{exp, sigmoid};
+use crate::kernels::zeros;
 
 /// A function of one number.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,7 +20,7 @@ const PART: usize = 1 << 13;
 
 /// Applies a curve to every element.
 pub(crate) fn map(x: &[f32], curve: Curve) -> Vec<f32> {
-    let mut y = vec![0.0; x.len()];
+    let mut y = zeros(x.len());
     let arch = Arch::new();
     y.par_chunks_mut(PART)
         .zip(x.par_chunks(PART))
@@ -43,7 +44,7 @@ pub(crate) fn map_gradient(x: &[f32], dy: &[f32], curve: Curve) -> Vec<f32> {
 ///
 /// `x`: `[tokens, 2 · inner]`; result: `[tokens, inner]`
 pub(crate) fn gate(x: &[f32], inner: usize) -> Vec<f32> {
-    let mut y = vec![0.0; x.len() / 2];
+    let mut y = zeros(x.len() / 2);
     let tokens = tokens_at_once(inner);
     let arch = Arch::new();
     y.par_chunks_mut(tokens * inner)
@@ -58,7 +59,7 @@ pub(crate) fn gate(x: &[f32], inner: usize) -> Vec<f32> {
 ///
 /// `dy`: `[tokens, inner]`; result: as `x`
 pub(crate) fn gate_gradient(x: &[f32], dy: &[f32], inner: usize) -> Vec<f32> {
-    let mut dx = vec![0.0; x.len()];
+    let mut dx = zeros(x.len());
     let tokens = tokens_at_once(inner);
     let arch = Arch::new();
     dx.par_chunks_mut(tokens * 2 * inner)

@@ -125,7 +125,7 @@ pub(super) fn multiply<S: Simd>(
                 .chunks_mut(target.step)
                 .take(count);
             for (sum, out) in sums.into_iter().zip(out) {
-                tile::store::<S>(sum, &mut out[columns.clone()]);
+                tile::store::<S, _>(sum, &mut out[columns.clone()]);
             }
         }
     }

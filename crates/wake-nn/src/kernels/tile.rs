@@ -1,6 +1,6 @@
 //! Register tile of which all matrix products here consist.
 
-use pulp::{Simd, WithSimd};
+use pulp::{Simd, WithSimd, bytemuck};
 
 /// Rows of a tile. With two vectors a row, the sums fill 12 of the 16 registers of AVX2.
 pub(super) const ROWS: usize = 6;
@@ -25,7 +25,7 @@ impl WithSimd for Width {
     }
 }
 
-/// Adds the product of six rows with a panel that is one tile wide.
+/// Adds the product of six rows with a panel that is V vectors wide.
 ///
 /// ```text
 /// sums[i][j] += Σ_k rows[i][start + k] · panel[k][j]
@@ -36,25 +36,26 @@ impl WithSimd for Width {
 /// - `rows[i]`: at least as long as the panel, counted from `start`
 /// - `panel`: `[k, width]`
 #[inline(always)]
-pub(super) fn multiply<S: Simd>(
+pub(super) fn multiply<S: Simd, const V: usize>(
     simd: S,
     rows: [&[f32]; ROWS],
     start: usize,
     panel: &[f32],
-    sums: &mut Sums<S>,
+    sums: &mut [[S::f32s; V]; ROWS],
 ) {
-    let (panel, _) = S::as_simd_f32s(panel).0.as_chunks::<2>();
+    let (panel, _) = S::as_simd_f32s(panel).0.as_chunks::<V>();
     let [mut a, mut b, mut c, mut d, mut e, mut f] = rows;
     for row in [&mut a, &mut b, &mut c, &mut d, &mut e, &mut f] {
         *row = &row[start..start + panel.len()];
     }
     // A local copy stays in registers; through the reference every step would store all sums.
     let mut held = *sums;
-    for (k, [left, right]) in panel.iter().enumerate() {
-        for (sum, value) in held.iter_mut().zip([a[k], b[k], c[k], d[k], e[k], f[k]]) {
+    for (k, panel) in panel.iter().enumerate() {
+        for (sums, value) in held.iter_mut().zip([a[k], b[k], c[k], d[k], e[k], f[k]]) {
             let value = simd.splat_f32s(value);
-            sum[0] = simd.mul_add_f32s(value, *left, sum[0]);
-            sum[1] = simd.mul_add_f32s(value, *right, sum[1]);
+            for (sum, panel) in sums.iter_mut().zip(panel) {
+                *sum = simd.mul_add_f32s(value, *panel, *sum);
+            }
         }
     }
     *sums = held;
@@ -107,23 +108,23 @@ pub(super) fn start<S: Simd>(simd: S, values: [f32; ROWS]) -> Sums<S> {
     sums
 }
 
-/// Sums that continue from those in `row`.
+/// Sums that continue from those in `row`, as many as there are.
 #[inline(always)]
-pub(super) fn load<S: Simd>(simd: S, row: &[f32]) -> [S::f32s; 2] {
-    match S::as_simd_f32s(row).0 {
-        [left, right, ..] => [*left, *right],
-        [left] => [*left, simd.partial_load_f32s(&row[S::F32_LANES..])],
-        [] => [simd.partial_load_f32s(row), simd.splat_f32s(0.0)],
-    }
+pub(super) fn load<S: Simd, const V: usize>(simd: S, row: &[f32]) -> [S::f32s; V] {
+    let whole = S::as_simd_f32s(row).0.first_chunk();
+    whole.copied().unwrap_or_else(|| {
+        let mut sums = [simd.splat_f32s(0.0); V];
+        bytemuck::cast_slice_mut(&mut sums)[..row.len()].copy_from_slice(row);
+        sums
+    })
 }
 
 /// Writes the sums of one row, as many as fit in `row`.
 #[inline(always)]
-pub(super) fn store<S: Simd>(sums: [S::f32s; 2], row: &mut [f32]) {
-    let lanes: &[f32] = pulp::bytemuck::cast_slice(&sums);
-    match row.split_at_mut_checked(width::<S>()) {
-        Some((row, _)) => row.copy_from_slice(&lanes[..width::<S>()]),
-        None => row.copy_from_slice(&lanes[..row.len()]),
+pub(super) fn store<S: Simd, const V: usize>(sums: [S::f32s; V], row: &mut [f32]) {
+    match S::as_mut_simd_f32s(row).0.first_chunk_mut() {
+        Some(whole) => *whole = sums,
+        None => row.copy_from_slice(&bytemuck::cast_slice(&sums)[..row.len()]),
     }
 }
 
@@ -147,7 +148,7 @@ mod tests {
             multiply(simd, rows, 1, &self.1[..depth * width::<S>()], &mut sums);
             let mut out = vec![0.0; ROWS * width::<S>()];
             for (row, sums) in out.chunks_mut(width::<S>()).zip(sums) {
-                store::<S>(sums, row);
+                store::<S, _>(sums, row);
             }
             out
         }

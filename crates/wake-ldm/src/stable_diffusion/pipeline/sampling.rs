@@ -9,8 +9,8 @@ use crate::error::Result;
 use crate::stable_diffusion::scheduler::{Scheduler, StepInput};
 use crate::streams::{INITIAL_STREAM, POSTERIOR_STREAM, STEP_STREAM};
 use crate::unet::UNetInput;
-use wake_nn::check_finite;
 use wake_nn::noise::{NoiseSource, normal_batch};
+use wake_nn::{check_finite, on_pool};
 
 /// Progress of a run, with its current latents.
 #[derive(Debug)]
@@ -170,11 +170,14 @@ impl<'a> Sampling<'a> {
         let timestep = self.scheduler.timesteps()[index];
         let batch = sample.dims()[0];
         let timesteps = Tensor::full([batch], timestep, &self.pipeline.device);
-        self.pipeline.parts.unet.forward(UNetInput {
+        let input = UNetInput {
             sample,
             timesteps,
             context: Some(context),
             condition,
+        };
+        on_pool(&self.pipeline.device, || {
+            self.pipeline.parts.unet.forward(input)
         })
     }
 

@@ -25,7 +25,7 @@ use crate::wake_model::sea_texture::SeaTexture;
 pub use image::{SampleSeconds, WakeImage, speckled};
 pub use self_check::self_check;
 use wake_nn::noise::NoiseSource;
-use wake_nn::{check_finite, check_range};
+use wake_nn::{check_finite, check_range, on_pool};
 
 /// Default number of steps from noise to image.
 const STEPS: usize = 3;
@@ -231,6 +231,10 @@ impl WakeSampler {
 
     /// Samples all images at once, from noise to grey.
     fn run(&self, inputs: &[Input], begin: Instant) -> Result<Drawn> {
+        on_pool(&self.device, || self.run_here(inputs, begin))
+    }
+
+    fn run_here(&self, inputs: &[Input], begin: Instant) -> Result<Drawn> {
         if inputs.is_empty() {
             return Err(Error::Model(wake_nn::Error::InvalidOption {
                 option: "images".to_owned(),

@@ -8,6 +8,7 @@ use super::super::silu::exp;
 use super::super::tile;
 use super::Shape;
 use super::forward::{Softmax, TOKENS, add_values, products};
+use crate::kernels::zeros;
 
 /// Queries whose weights are held at a time: as many as tokens in the forward pass.
 const QUERIES: usize = TOKENS;
@@ -61,7 +62,7 @@ pub(crate) fn gradients(
         .collect();
     let join = |of: usize, tokens: usize| {
         let depth = shape.depth();
-        let mut out = vec![0.0; shape.batch * tokens * shape.channels];
+        let mut out = zeros(shape.batch * tokens * shape.channels);
         out.par_chunks_exact_mut(shape.channels)
             .enumerate()
             .with_min_len(64)

@@ -7,6 +7,7 @@ use super::super::product::Rows;
 use super::super::silu::exp;
 use super::super::tile::{self, ROWS};
 use super::Shape;
+use crate::kernels::zeros;
 
 /// Tokens whose scores are held at a time, a multiple of a tile's rows: the scores of 32 queries take 24 KiB of a core's
 /// L1 cache.
@@ -35,7 +36,7 @@ pub(crate) fn attend(
     let arch = Arch::new();
     let block = arch.dispatch(tile::Width);
     let [asking, seen] = shape.tokens;
-    let mut out = vec![0.0; query.len()];
+    let mut out = zeros(query.len());
     let mut softmaxes = vec![Softmax::default(); shape.batch * asking * shape.heads];
     out.par_chunks_mut(asking * shape.channels)
         .zip(softmaxes.par_chunks_mut(asking * shape.heads))
@@ -148,7 +149,7 @@ pub(super) fn products<S: Simd>(simd: S, key: &Rows<'_>, query: &[f32], scores: 
         let mut sums = tile::start(simd, [0.0; ROWS]);
         tile::multiply(simd, rows, 0, query, &mut sums);
         for (sum, scores) in sums.into_iter().zip(scores.chunks_exact_mut(width)) {
-            tile::store::<S>(sum, scores);
+            tile::store::<S, _>(sum, scores);
         }
     }
 }
@@ -221,9 +222,9 @@ pub(super) fn add_values<S: Simd>(
         );
         let rows = sums[first * width..].chunks_exact_mut(width);
         for (tile, sums) in tile.into_iter().skip(first - from).zip(rows) {
-            let before = tile::load(simd, sums);
+            let before: [_; 2] = tile::load(simd, sums);
             let sum = [0, 1].map(|half| simd.add_f32s(before[half], tile[half]));
-            tile::store::<S>(sum, sums);
+            tile::store::<S, _>(sum, sums);
         }
     }
 }

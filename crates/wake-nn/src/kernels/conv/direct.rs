@@ -9,6 +9,7 @@ use super::geometry::Geometry;
 use super::layout::{Gather, Layout};
 use crate::kernels::columns::columns;
 use crate::kernels::tile::{self, ROWS};
+use crate::kernels::zeros;
 
 /// Rows of a panel of patches that are multiplied at once: 16 columns of them take 32 KiB.
 const DEPTH: usize = 512;
@@ -25,7 +26,7 @@ pub(super) fn convolve(
 ) -> Vec<f32> {
     let layout = Layout::new(geometry);
     let planes = layout.lay_out(x, geometry);
-    let mut y = vec![0.0; geometry.batch * geometry.channels[1] * geometry.pixels_out()];
+    let mut y = zeros(geometry.batch * geometry.channels[1] * geometry.pixels_out());
     let arch = arch();
     let block = block_width(geometry, arch.dispatch(tile::Width));
     let one = Geometry {
@@ -149,7 +150,7 @@ impl Block<'_> {
                 tile::multiply(simd, weights, 0, patches, &mut sums);
                 for (sum, y) in sums.into_iter().zip(&mut *y) {
                     let part = part(y);
-                    tile::store::<S>(sum, &mut y[part]);
+                    tile::store::<S, _>(sum, &mut y[part]);
                 }
             }
         }

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::geometry::Geometry;
 use crate::kernels::tile;
+use crate::kernels::zeros;
 
 /// Positions in a laid-out plane.
 ///
@@ -67,7 +68,7 @@ impl Layout {
     pub(super) fn lay_out(&self, x: &[f32], geometry: &Geometry) -> Vec<f32> {
         let [rows, columns] = geometry.size;
         let [top, left, ..] = geometry.border;
-        let mut planes = vec![0.0; x.len() / (rows * columns) * self.plane()];
+        let mut planes = zeros(x.len() / (rows * columns) * self.plane());
         planes
             .par_chunks_mut(self.plane())
             .zip(x.par_chunks(rows * columns))

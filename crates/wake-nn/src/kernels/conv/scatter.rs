@@ -11,6 +11,7 @@ use super::geometry::Geometry;
 use crate::kernels::arch::arch;
 use crate::kernels::columns::columns;
 use crate::kernels::tile::{self, ROWS};
+use crate::kernels::zeros;
 
 /// Image channels per task: with 1280 output channels and nine taps, their weights take 720 KiB of a core's L2 cache.
 const CHANNELS: usize = 16;
@@ -29,7 +30,7 @@ pub(super) fn image_gradient(dy: &[f32], weight: &[f32], geometry: &Geometry) ->
     let [channels_in, _] = geometry.channels;
     let image = geometry.size[0] * geometry.size[1];
     let dy = packed(dy, geometry, arch.dispatch(tile::Width));
-    let mut dx = vec![0.0; geometry.batch * channels_in * image];
+    let mut dx = zeros(geometry.batch * channels_in * image);
     columns(&mut dx, channels_in * image, CHANNELS * image)
         .into_par_iter()
         .enumerate()
@@ -106,7 +107,7 @@ impl WithSimd for Share<'_> {
                         }
                         tile::multiply_columns(simd, left, ROWS, 0..ROWS, panel, &mut sums);
                         for (sum, row) in sums.into_iter().zip(products.chunks_exact_mut(width)) {
-                            tile::store::<S>(sum, row);
+                            tile::store::<S, _>(sum, row);
                         }
                     }
                 }

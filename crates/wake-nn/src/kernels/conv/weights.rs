@@ -9,6 +9,7 @@ use super::geometry::Geometry;
 use super::layout::Layout;
 use crate::kernels::sum::sum;
 use crate::kernels::tile::{self, ROWS};
+use crate::kernels::zeros;
 
 /// Gradient with respect to the weights, with the shapes of [`weight_gradient`](super::weight_gradient).
 pub(super) fn weight_gradient(x: &[f32], dy: &[f32], geometry: &Geometry) -> Vec<f32> {
@@ -68,7 +69,7 @@ pub(super) fn interleave(
     let batch = images.len() / (channels * rows * columns);
     let row = (left + columns + right) * width;
     let plane = (top + rows + bottom) * row;
-    let mut out = vec![0.0; batch * tiles * plane];
+    let mut out = zeros(batch * tiles * plane);
     out.par_chunks_mut(plane)
         .enumerate()
         .with_min_len(2)
@@ -106,7 +107,7 @@ fn interleave_rows(rows: &[f32], step: usize, out: &mut [f32], width: usize) {
 fn transpose(matrix: &[f32], columns: usize) -> Vec<f32> {
     const SQUARE: usize = 16;
     let rows = matrix.len() / columns;
-    let mut out = vec![0.0; matrix.len()];
+    let mut out = zeros(matrix.len());
     out.par_chunks_mut(SQUARE * rows)
         .enumerate()
         .for_each(|(i, out)| {
@@ -208,7 +209,7 @@ impl Share<'_> {
                 .into_iter()
                 .zip(gradient.chunks_exact_mut(channels_out))
             {
-                tile::store::<S>(sum, &mut row[first..end]);
+                tile::store::<S, _>(sum, &mut row[first..end]);
             }
         }
     }

@@ -11,6 +11,7 @@ use crate::kernels::conv::direct::by_blocks;
 use crate::kernels::conv::geometry::Geometry;
 use crate::kernels::conv::layout::{Gather, Layout};
 use crate::kernels::tile::{self, ROWS};
+use crate::kernels::zeros;
 
 /// Numbers of the transformed image that a task keeps in a core's L2 cache: 512 KiB.
 const NEAR: usize = 128 * 1024;
@@ -30,7 +31,7 @@ pub(in crate::kernels::conv) fn convolve(
     let weight = &transformed(weight, geometry);
     let (images, rows) = task(&tiles, width);
     let columns = geometry.size_out()[1];
-    let mut y = vec![0.0; geometry.batch * geometry.channels[1] * geometry.pixels_out()];
+    let mut y = zeros(geometry.batch * geometry.channels[1] * geometry.pixels_out());
     let block = 2 * rows * columns;
     by_blocks(
         &mut y,
@@ -227,7 +228,7 @@ impl Block<'_> {
                     tile::multiply(simd, weights, 0, image, &mut sums);
                     let rows = products.chunks_exact_mut(PLACES * width);
                     for (sum, row) in sums.into_iter().zip(rows) {
-                        tile::store::<S>(sum, &mut row[place * width..][..width]);
+                        tile::store::<S, _>(sum, &mut row[place * width..][..width]);
                     }
                 }
             }

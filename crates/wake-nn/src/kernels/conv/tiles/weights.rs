@@ -99,7 +99,7 @@ impl WithSimd for Share<'_> {
                     }
                     tile::multiply_columns(simd, asked, channels, columns, seen, &mut sums);
                     for (sum, row) in sums.into_iter().zip(gradient.chunks_exact_mut(width)) {
-                        tile::store::<S>(sum, row);
+                        tile::store::<S, _>(sum, row);
                     }
                 }
             }
