@@ -185,6 +185,8 @@ mod tests {
     #[test]
     fn a_range_is_the_same_in_pieces_and_far_away() {
         let mixture = mixture(&[0.61, 0.2, 0.19]);
+        assert_eq!(mixture.size(), mixture.parts[0].1.size());
+        assert!(mixture.size()[0] > 0);
         for start in [0, 17, u64::MAX / 2] {
             let whole = told(mixture.items(start..start + 60).unwrap());
             let pieces = (0..12).flat_map(|k| {

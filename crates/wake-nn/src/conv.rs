@@ -49,7 +49,7 @@ mod native {
     }
 
     /// Sizes of a layer with a square kernel on images of these dimensions; `None` for other layers.
-    fn geometry(layer: &Conv2d, dims: [usize; 4]) -> Option<Geometry> {
+    pub(super) fn geometry(layer: &Conv2d, dims: [usize; 4]) -> Option<Geometry> {
         let [batch, channels_in, rows, columns] = dims;
         let [channels_out, kernel_channels, kernel, kernel_columns] = layer.weight.dims();
         let border = match layer.padding {
@@ -116,6 +116,33 @@ mod native {
             let [dx, dweight] =
                 Operation::<2>::gradients(self, [x, weight], &(), dy, [wanted[0], wanted[1]]);
             [dx, dweight, conv::bias_gradient(dy, self)]
+        }
+    }
+}
+
+#[cfg(all(test, feature = "flex"))]
+mod tests {
+    use super::*;
+
+    /// Other layers are left to burn.
+    #[test]
+    fn kernels_compute_square_layers_of_one_stride_and_one_group() {
+        let device = Device::flex();
+        let computes =
+            |layer: Conv2dConfig| native::geometry(&layer.init(&device), [2, 4, 5, 7]).is_some();
+        let plain = || {
+            Conv2dConfig::new([4, 6], [3, 3]).with_padding(PaddingConfig2d::Explicit(1, 1, 1, 1))
+        };
+        assert!(computes(plain()));
+        assert!(computes(plain().with_stride([2, 2])));
+        for other in [
+            Conv2dConfig::new([4, 6], [3, 1]),
+            plain().with_stride([1, 2]),
+            plain().with_dilation([2, 2]),
+            plain().with_groups(2),
+            plain().with_padding(PaddingConfig2d::Same),
+        ] {
+            assert!(!computes(other.clone()), "{other}");
         }
     }
 }

@@ -164,4 +164,14 @@ mod tests {
             );
         }
     }
+
+    #[test]
+    fn networks_run_on_the_pool_and_results_return() {
+        assert_eq!(rayon::current_thread_index(), None);
+        let inside = || rayon::current_thread_index().is_some();
+        assert!(on_pool(&Device::flex(), inside));
+        let text = "borrowed".to_owned();
+        let nested = || on_pool(&Device::flex(), || text.len());
+        assert_eq!(on_pool(&Device::flex(), nested), 8);
+    }
 }

@@ -109,7 +109,7 @@ mod native {
 
 #[cfg(all(test, feature = "flex"))]
 mod tests {
-    use burn::tensor::{Device, Int};
+    use burn::tensor::{DType, Device, Int};
 
     use super::*;
 
@@ -151,6 +151,11 @@ mod tests {
             let from = (c * rows * s + r * s + i) * columns * s + q * s + j;
             assert_eq!(value as usize, from, "{place}");
         }
+        // Numbers of another type take burn's operations.
+        let wide = |x: &Tensor<4>| x.clone().cast(DType::F64);
+        let data = |x: Tensor<4>| x.cast(DType::F32).into_data();
+        data(space_to_depth(wide(&x), s)).assert_eq(&y.clone().into_data(), true);
+        data(depth_to_space(wide(&y), s)).assert_eq(&x.clone().into_data(), true);
         depth_to_space(y, s)
             .into_data()
             .assert_eq(&x.into_data(), true);

@@ -369,3 +369,37 @@ impl<M: Module> Trainer<M> {
         Ok(())
     }
 }
+
+#[cfg(all(test, feature = "flex"))]
+mod tests {
+    use std::sync::Mutex;
+
+    use burn::nn::{Linear, LinearConfig};
+
+    use super::*;
+
+    /// Whether the loss of each part of a step is computed on a thread of rayon's pool.
+    fn on_the_pool(devices: usize) -> Vec<bool> {
+        let devices = vec![Device::flex().autodiff(); devices];
+        let model = LinearConfig::new(3, 2).init(&devices[0]);
+        let mut trainer = Trainer::new(model, TrainerOptions::default(), devices);
+        let seen = Mutex::new(Vec::new());
+        let report = trainer.step(|model: &Linear, device, _| {
+            let inside = rayon::current_thread_index().is_some();
+            seen.lock().expect("no panic").push(inside);
+            model
+                .forward(Tensor::<2>::ones([4, 3], device))
+                .square()
+                .mean()
+        });
+        assert!(report.applied && report.loss > 0.0);
+        seen.into_inner().expect("no panic")
+    }
+
+    #[test]
+    fn a_step_on_one_device_runs_on_the_pool_and_one_on_several_does_not() {
+        assert_eq!(on_the_pool(1), [true]);
+        // Their threads would occupy the pool while they wait for it.
+        assert_eq!(on_the_pool(2), [false, false]);
+    }
+}

@@ -337,6 +337,24 @@ mod tests {
     use super::*;
     use crate::unet::UNetInput;
 
+    #[test]
+    fn lists_have_an_entry_per_level() {
+        let config = UNetConfig::small(2, Some(8), None);
+        assert!(config.validate().is_ok());
+        let other = vec![true; config.down_attention.len() + 1];
+        for (name, config) in [
+            (
+                "down_block_types",
+                config.clone().with_down_attention(other.clone()),
+            ),
+            ("up_block_types", config.clone().with_up_attention(other)),
+            ("attention_head_dim", config.clone().with_heads(vec![1])),
+        ] {
+            let error = config.validate().expect_err(name).to_string();
+            assert!(error.contains(name), "{error}");
+        }
+    }
+
     /// A model without a context has no weights for it, needs none as input, and keeps this in its file.
     #[test]
     fn a_model_may_attend_to_pixels_alone() {
@@ -353,6 +371,7 @@ mod tests {
         }
         let device = Device::flex();
         let unet = config.init(&device);
+        assert_eq!(unet.condition_channels(), Some(3));
         let fewer = attending.init(&device).num_params() - unet.num_params();
         // Four transformers, each with a norm, maps from 16 and 8 channels to 16, and an output map with bias.
         assert_eq!(fewer, 4 * (2 * 16 + 16 * 16 + 2 * 8 * 16 + 16 * 16 + 16));

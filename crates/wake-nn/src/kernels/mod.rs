@@ -34,6 +34,22 @@ fn zeros(length: usize) -> Vec<f32> {
     zeros
 }
 
+#[test]
+fn zeros_are_as_many_as_asked_for() {
+    for length in [
+        0,
+        1,
+        (1 << 19) - 1,
+        1 << 19,
+        (1 << 19) + 1,
+        (1 << 20) + 1000,
+    ] {
+        let zeros = zeros(length);
+        assert_eq!(zeros.len(), length);
+        assert!(zeros.iter().all(|&zero| zero.to_bits() == 0));
+    }
+}
+
 /// Reproducible numbers between −½ and ½.
 #[cfg(test)]
 fn noise(count: usize, seed: u32) -> Vec<f32> {

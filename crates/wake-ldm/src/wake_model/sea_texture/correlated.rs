@@ -212,6 +212,26 @@ mod tests {
         }
     }
 
+    /// Values of Parzen (1961), by hand.
+    #[test]
+    fn parzens_window_has_its_published_values() {
+        for (distance, expected) in [
+            (0, 1.0),
+            (2, 0.71875),
+            (-2, 0.71875),
+            (4, 0.25),
+            (6, 0.03125),
+            (8, 0.0),
+            (11, 0.0),
+        ] {
+            assert!((parzen(distance, 8) - expected).abs() < 1e-15, "{distance}");
+        }
+        assert_eq!(
+            [0, 1].map(|distance| parzen(distance, 0).to_bits()),
+            [1.0, 0.0].map(f64::to_bits)
+        );
+    }
+
     /// Comparison with direct sums; the transforms of 30 × 37 values in f32 round to a few 1e-6.
     #[test]
     fn the_correlation_is_the_mean_product_of_all_pairs() {
