@@ -247,6 +247,8 @@ mod tests {
             assert!(found.a >= 0.0 && found.b >= 0.0);
             for x in [0.05, 0.2, 0.5, 0.8, 0.95] {
                 let (p, q) = (curve.of(x), found.of(x));
+                let odds = x.powf(curve.a) / (1.0 - x).powf(curve.b) * curve.c.exp();
+                assert!((p - odds / (1.0 + odds)).abs() < 1e-12, "{curve:?} at {x}");
                 assert!((p - q).abs() < 0.03, "{curve:?} {found:?} at {x}: {p} {q}");
             }
         }

@@ -284,6 +284,17 @@ mod tests {
         }
     }
 
+    /// Of equal tips two cells apart the first is kept, of tips three cells apart both.
+    #[test]
+    fn tips_are_the_highest_around() {
+        let tips = |apart: f32| {
+            let at = |x: f32| wake([81.5 + x, 121.5], 90.0);
+            drawn(64, &[at(0.0), at(4.0 * apart)]).tips()
+        };
+        assert_eq!(tips(2.0), [30 * 64 + 20]);
+        assert_eq!(tips(3.0), [30 * 64 + 20, 30 * 64 + 23]);
+    }
+
     /// Two wakes that cross are both found where they were drawn.
     #[test]
     fn crossing_wakes_are_both_found() {

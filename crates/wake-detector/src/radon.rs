@@ -331,6 +331,32 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_line_found_from_both_ends_counts_once() {
+        let of = |score: f32, tip: [f32; 2], axis_deg: f32| {
+            let wake = Wake {
+                tip,
+                axis_deg,
+                half_angle_deg: 0.0,
+                length: 200.0,
+                snr: f32::INFINITY,
+                contrast_db: None,
+            };
+            Detection::new(score, wake)
+        };
+        let first = of(0.9, [100.0, 150.0], 30.0);
+        let end = first.wake.at(190.0);
+        let beside = [100.0 + 40.0 * 0.866, 150.0 + 40.0 * 0.5];
+        let found = vec![
+            first,
+            of(0.8, end, 210.0),
+            of(0.7, beside, 30.0),
+            of(0.6, [100.0, 150.0], 60.0),
+        ];
+        let scores: Vec<f32> = without_lines_twice(found).iter().map(|d| d.score).collect();
+        assert_eq!(scores, [0.9, 0.7, 0.6]);
+    }
+
     /// A dark line one standard deviation deep is found where it lies, and the sea around it stays below the threshold.
     #[test]
     fn a_dark_line_beside_a_target_is_found() {

@@ -410,6 +410,26 @@ mod tests {
         assert!(shared(&square, &far, [100.0, 100.0]).abs() < 1e-12);
     }
 
+    /// A ray far from the tip fits by its distance from the label's tip and middle, worked out by hand.
+    #[test]
+    fn a_ray_from_the_middle_of_a_line_fits() {
+        let ray = Ray {
+            tip: [0.0, 0.0],
+            axis_deg: 90.0,
+            oriented_box: None,
+        };
+        // The middle lies 50 sin 5° = 4.358 lower than the tip.
+        let found = fit(&ray, [200.0, 10.0], 95.0, 100.0).expect("a fit");
+        assert!(
+            (found - (1.0 + 14.357787 / 25.0 + 0.5)).abs() < 1e-6,
+            "{found}"
+        );
+        assert_eq!(fit(&ray, [200.0, 10.0], 95.0, 400.0), None);
+        assert_eq!(fit(&ray, [200.0, 10.0], 101.0, 100.0), None);
+        let near = fit(&ray, [30.0, 40.0], 90.0, 100.0).expect("tips are near");
+        assert!((near - 50.0 / 60.0).abs() < 1e-12);
+    }
+
     fn ray(value: &Value) -> Ray {
         let number = |v: &Value| v.as_f64().expect("a number");
         let point = |v: &Value| [number(&v[0]), number(&v[1])];

@@ -470,6 +470,27 @@ mod tests {
         }
     }
 
+    /// Twice the distances in an image of half the network's scale; nothing beyond the image.
+    #[test]
+    fn windows_surround_the_beginning_of_a_wake() {
+        let along = |tip: [f32; 2]| {
+            let wake = Wake {
+                tip,
+                axis_deg: 90.0,
+                half_angle_deg: 4.0,
+                length: 1000.0,
+                snr: f32::INFINITY,
+                contrast_db: None,
+            };
+            Detection::new(0.5, wake)
+        };
+        let found = [along([500.5, 300.5]), along([2990.5, 1990.5])];
+        assert_eq!(
+            windows(&found, [2000, 3000], 0.5),
+            [[[44, 244], [556, 1556]], [[1734, 2734], [2000, 3000]]]
+        );
+    }
+
     const SEARCH: Search = Search {
         spacing: None,
         least_score: 0.1,

@@ -348,7 +348,7 @@ mod tests {
                 config.clone().with_down_attention(other.clone()),
             ),
             ("up_block_types", config.clone().with_up_attention(other)),
-            ("attention_head_dim", config.clone().with_heads(vec![1])),
+            ("attention_head_dim", config.with_heads(vec![1])),
         ] {
             let error = config.validate().expect_err(name).to_string();
             assert!(error.contains(name), "{error}");
