@@ -2,9 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
-use wake_physics::estimate::{
-    Estimate, Parameter, Priors, Sighting, Value, bound, estimate, refine,
-};
+use wake_physics::estimate::{Parameter, Priors, Sighting, Value, bound, estimate, refine};
 use wake_physics::measure::{angle_between, axis_between};
 use wake_physics::{Field, Scene};
 
@@ -72,9 +70,9 @@ impl ToEstimate {
         let limit = bound(&self.truth, &Parameter::OF_WAKE, &self.priors)?;
         let told = |value: f64| value.is_finite().then_some(value);
         let values = Parameter::OF_WAKE.map(|parameter| {
-            let [_, deviation] = found.of(parameter);
+            let [value, deviation] = found.of(parameter);
             [
-                told(error(&found, &self.truth, parameter)),
+                told(error(value, &self.truth, parameter)),
                 told(deviation),
                 told(limit.of(parameter)),
             ]
@@ -100,8 +98,7 @@ impl ToEstimate {
 }
 
 /// Estimated less true value; for the wind direction the error of its axis, for factors the logarithm.
-fn error(found: &Estimate, truth: &Scene, parameter: Parameter) -> f64 {
-    let [value, _] = found.of(parameter);
+fn error(value: f64, truth: &Scene, parameter: Parameter) -> f64 {
     match parameter {
         Parameter::Gain | Parameter::Texture => value,
         Parameter::Size => value - Value::Size.of(truth),
@@ -210,6 +207,29 @@ mod tests {
             measured: [None; 2],
             sighted: 0.0,
         }
+    }
+
+    #[test]
+    fn errors_are_estimates_less_true_values() {
+        let mut truth = Scene::default();
+        let mut ship = wake_physics::Ship::default();
+        (ship.speed, ship.heading) = (9.0, 350.0);
+        truth.ships = vec![ship];
+        (truth.sea.wind_speed, truth.sea.wind_toward) = (6.0, 100.0);
+        let size = Value::Size.of(&truth);
+        for (parameter, value, expected) in [
+            (Parameter::Value(Value::Speed), 10.5, 1.5),
+            (Parameter::Value(Value::Heading), 20.0, 30.0),
+            (Parameter::Value(Value::WindSpeed), 5.0, -1.0),
+            // An axis: toward 290° is 10° from toward 100°, as is 110°.
+            (Parameter::Value(Value::WindToward), 290.0, 10.0),
+            (Parameter::Size, size + 0.25, 0.25),
+            (Parameter::Gain, 0.1, 0.1),
+        ] {
+            let found = error(value, &truth, parameter);
+            assert!((found - expected).abs() < 1e-9, "{parameter:?}: {found}");
+        }
+        assert!(size > 0.0);
     }
 
     /// Table of Abramowitz & Stegun (1964), 26.1.

@@ -238,6 +238,25 @@ fn pairs_for_validation_are_not_learnt_from() {
 }
 
 #[test]
+fn all_pairs_are_learnt_from() {
+    let folder = tempfile::tempdir().unwrap();
+    let recipe = wake_dataset::Recipe::default();
+    let recipe = recipe.with_assignments(&["scene.grid.rows = 32", "scene.grid.columns = 32"]);
+    let manifest = wake_dataset::Manifest::new(recipe.unwrap(), 3, 4).unwrap();
+    let manifest = manifest.with_val_share(0.0).unwrap();
+    let source = manifest.source().unwrap();
+    wake_dataset::write(folder.path(), &manifest, &source, 1, |_| ()).unwrap();
+    let folder = wake_dataset::Folder::open(folder.path()).unwrap();
+    let pairs = PromptedPairs::new(&folder, None, 5);
+    let drawn: Vec<_> = (0..64).map(|at| pairs.at(at).unwrap().image).collect();
+    // One of four is missed with a probability of 4 · 0.75⁶⁴ = 4e-8.
+    for position in 0..4 {
+        let learnt = folder.pair(position).unwrap().image;
+        assert!(drawn.contains(&learnt), "{position}");
+    }
+}
+
+#[test]
 fn a_killed_run_goes_on_to_the_bit() {
     let device = Device::flex();
     let (base, frozen) = (unet(&device), frozen(&device));
