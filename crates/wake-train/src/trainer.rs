@@ -378,7 +378,7 @@ mod tests {
 
     use super::*;
 
-    /// Whether the loss of each part of a step is computed on a thread of rayon's pool.
+    /// For each part of a step: true if its loss is computed on a thread of rayon's pool.
     fn on_the_pool(devices: usize) -> Vec<bool> {
         let devices = vec![Device::flex().autodiff(); devices];
         let model = LinearConfig::new(3, 2).init(&devices[0]);

@@ -20,8 +20,8 @@ mod tile;
 
 use rayon::prelude::*;
 
-/// Zeros in memory of their own. All cores write a large block, unless it is so large that the system's allocator gets fresh memory
-/// from the kernel, which is zero.
+/// A vector of zeros. All cores write blocks of 2 to 32 MiB; smaller ones are faster on one, and larger ones come from the system,
+/// which zeroes them.
 fn zeros(length: usize) -> Vec<f32> {
     const BLOCK: usize = 1024;
     if !(1 << 19..1 << 23).contains(&length) {

@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+use std::path::Path;
+
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use serde_json::{Value, json};
@@ -218,17 +220,22 @@ fn a_part_holds_its_own_images_alone() {
     assert_eq!(part.images.iter::<f32>().collect::<Vec<_>>(), pixels);
 }
 
+/// A data set of four pairs, of which a share is for validation.
+fn four_pairs(folder: &Path, val_share: f64) -> wake_dataset::Folder {
+    let recipe = wake_dataset::Recipe::default();
+    let recipe = recipe.with_assignments(&["scene.grid.rows = 32", "scene.grid.columns = 32"]);
+    let manifest = wake_dataset::Manifest::new(recipe.unwrap(), 3, 4).unwrap();
+    let manifest = manifest.with_val_share(val_share).unwrap();
+    let source = manifest.source().unwrap();
+    wake_dataset::write(folder, &manifest, &source, 1, |_| ()).unwrap();
+    wake_dataset::Folder::open(folder).unwrap()
+}
+
 /// If all images but one are for validation, only that one is drawn.
 #[test]
 fn pairs_for_validation_are_not_learnt_from() {
     let folder = tempfile::tempdir().unwrap();
-    let recipe = wake_dataset::Recipe::default();
-    let recipe = recipe.with_assignments(&["scene.grid.rows = 32", "scene.grid.columns = 32"]);
-    let manifest = wake_dataset::Manifest::new(recipe.unwrap(), 3, 4).unwrap();
-    let manifest = manifest.with_val_share(0.75).unwrap();
-    let source = manifest.source().unwrap();
-    wake_dataset::write(folder.path(), &manifest, &source, 1, |_| ()).unwrap();
-    let folder = wake_dataset::Folder::open(folder.path()).unwrap();
+    let folder = four_pairs(folder.path(), 0.75);
     let [position] = folder.trainset()[..] else {
         panic!("{:?}", folder.trainset());
     };
@@ -240,13 +247,7 @@ fn pairs_for_validation_are_not_learnt_from() {
 #[test]
 fn all_pairs_are_learnt_from() {
     let folder = tempfile::tempdir().unwrap();
-    let recipe = wake_dataset::Recipe::default();
-    let recipe = recipe.with_assignments(&["scene.grid.rows = 32", "scene.grid.columns = 32"]);
-    let manifest = wake_dataset::Manifest::new(recipe.unwrap(), 3, 4).unwrap();
-    let manifest = manifest.with_val_share(0.0).unwrap();
-    let source = manifest.source().unwrap();
-    wake_dataset::write(folder.path(), &manifest, &source, 1, |_| ()).unwrap();
-    let folder = wake_dataset::Folder::open(folder.path()).unwrap();
+    let folder = four_pairs(folder.path(), 0.0);
     let pairs = PromptedPairs::new(&folder, None, 5);
     let drawn: Vec<_> = (0..64).map(|at| pairs.at(at).unwrap().image).collect();
     // One of four is missed with a probability of 4 · 0.75⁶⁴ = 4e-8.
