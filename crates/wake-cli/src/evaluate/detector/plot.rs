@@ -12,13 +12,16 @@ const NAMES: [&str; 2] = ["simulated wakes above 1 dB", "real tiles, clear wakes
 
 /// Plots one line per training with its average precision on simulated and on real images.
 pub(crate) fn transfer(path: &Path, trainings: &[(String, [f64; 2])]) -> Outcome<()> {
-    let area = SVGBackend::new(path, (760, 120 + 28 * trainings.len() as u32)).into_drawing_area();
+    // The legend takes the first two lines.
+    let height = 120 + 28 * (trainings.len() as u32 + 2);
+    let area = SVGBackend::new(path, (760, height)).into_drawing_area();
     area.fill(&WHITE)?;
-    let lines = (0..trainings.len() as i32).into_segmented();
+    let lines = (0..trainings.len() as i32 + 2).into_segmented();
+    let longest = trainings.iter().map(|(name, _)| name.chars().count()).max();
     let mut chart = ChartBuilder::on(&area)
         .margin(16)
         .x_label_area_size(44)
-        .y_label_area_size(96)
+        .y_label_area_size(24 + 6 * longest.unwrap_or(0) as u32)
         .build_cartesian_2d(0.0..1.0, lines)?;
     let name = |line: &SegmentValue<i32>| match line {
         SegmentValue::CenterOf(n) => trainings
@@ -28,7 +31,8 @@ pub(crate) fn transfer(path: &Path, trainings: &[(String, [f64; 2])]) -> Outcome
     };
     chart
         .configure_mesh()
-        .y_labels(trainings.len())
+        .max_light_lines(1)
+        .y_labels(trainings.len() + 2)
         .y_label_formatter(&name)
         .x_desc("average precision")
         .draw()?;
@@ -46,7 +50,7 @@ pub(crate) fn transfer(path: &Path, trainings: &[(String, [f64; 2])]) -> Outcome
         .configure_series_labels()
         .background_style(WHITE.mix(0.8))
         .border_style(BLACK)
-        .position(SeriesLabelPosition::LowerRight)
+        .position(SeriesLabelPosition::UpperRight)
         .draw()?;
     area.present()?;
     Ok(())
