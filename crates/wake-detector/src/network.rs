@@ -190,6 +190,21 @@ impl Network {
     /// multiples of [`MULTIPLE`].
     pub fn forward(&self, images: Tensor<4>) -> Tensor<4> {
         let wide = images.dtype();
+        let [fine, middle, coarse] = self.features(images);
+        let up = self.up2.forward(convolve(&self.narrow2, coarse), None);
+        let middle = self.middle_up.forward(middle + up);
+        let up = self.up1.forward(convolve(&self.narrow1, middle), None);
+        let fine = self.fine_up.forward(fine + up);
+        cast_to(convolve(&self.head, self.norm.forward_silu(fine)), wide)
+    }
+
+    /// Computes the encoder's features of a batch of images at strides 4, 8 and 16, in the type of numbers of the weights.
+    ///
+    /// # Shapes
+    ///
+    /// `[batch, INPUTS, rows, columns]` to `[batch, 24, rows / 4, columns / 4]`, `[batch, 48, rows / 8, columns / 8]` and
+    /// `[batch, 96, rows / 16, columns / 16]`; rows and columns are multiples of [`MULTIPLE`].
+    pub fn features(&self, images: Tensor<4>) -> [Tensor<4>; 3] {
         let images = cast_to(images, self.stem.weight.val().dtype());
         let fine = self
             .fine
@@ -200,11 +215,7 @@ impl Network {
         for block in &self.coarse {
             coarse = block.forward(coarse);
         }
-        let up = self.up2.forward(convolve(&self.narrow2, coarse), None);
-        let middle = self.middle_up.forward(middle + up);
-        let up = self.up1.forward(convolve(&self.narrow1, middle), None);
-        let fine = self.fine_up.forward(fine + up);
-        cast_to(convolve(&self.head, self.norm.forward_silu(fine)), wide)
+        [fine, middle, coarse]
     }
 }
 

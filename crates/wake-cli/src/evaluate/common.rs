@@ -4,7 +4,7 @@ use crate::exit::Outcome;
 use clap::Args;
 use std::path::PathBuf;
 use wake_nn::burn::tensor::Device;
-use wake_train::metrics::{Lpips, LpipsNetwork};
+use wake_train::metrics::{Lpips, LpipsNetwork, Perceptual};
 
 /// Options shared by evaluations of images.
 #[derive(Args)]
@@ -30,12 +30,14 @@ pub(crate) struct Common {
 }
 
 impl Common {
-    /// Loads the networks of LPIPS, if they are given.
-    pub(crate) fn lpips(&self, device: &Device) -> Outcome<Option<Lpips>> {
-        let (Some(backbone), Some(linear)) = (&self.lpips_backbone, &self.lpips_linear) else {
-            return Ok(None);
+    /// Loads the networks of perceptual distances; LPIPS only if its weights are given.
+    pub(crate) fn perceptual(&self, device: &Device) -> Outcome<Perceptual> {
+        let lpips = match (&self.lpips_backbone, &self.lpips_linear) {
+            (Some(backbone), Some(linear)) => {
+                Some(Lpips::load(LpipsNetwork::Alex, backbone, linear, device)?)
+            }
+            _ => None,
         };
-        let lpips = Lpips::load(LpipsNetwork::Alex, backbone, linear, device)?;
-        Ok(Some(lpips))
+        Ok(Perceptual::new(lpips, device)?)
     }
 }

@@ -8,7 +8,7 @@ use std::path::Path;
 use wake_ldm::WakeSampler;
 use wake_nn::burn::tensor::Device;
 use wake_train::evaluation::{Evaluation, TextToImage};
-use wake_train::metrics::Lpips;
+use wake_train::metrics::Perceptual;
 
 /// Held-out scene of the picture of all kinds of images.
 const PICTURED: u64 = 2;
@@ -19,7 +19,7 @@ pub(super) struct Judged<'a> {
     /// Models that are timed.
     pub(super) wake_model: Option<&'a WakeSampler>,
     pub(super) text_to_image: Option<&'a TextToImage<'a>>,
-    pub(super) lpips: Option<&'a Lpips>,
+    pub(super) perceptual: &'a Perceptual,
 }
 
 impl Judged<'_> {
@@ -31,7 +31,7 @@ impl Judged<'_> {
         bar.set_style(ProgressStyle::with_template(
             "{msg:20} {bar:30} {pos}/{len}, {eta} left",
         )?);
-        let figures = evaluation.figures(self.lpips, device, &|what, more| {
+        let figures = evaluation.figures(self.perceptual, device, &|what, more| {
             bar.set_message(what);
             bar.inc(more);
         })?;

@@ -46,7 +46,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
 fn models(arguments: &Arguments) -> Outcome<()> {
     let common = &arguments.common;
     let device = device_named(&common.device)?;
-    let lpips = common.lpips(&device)?;
+    let perceptual = common.perceptual(&device)?;
     let model = match arguments.simulator_only {
         true => None,
         false => {
@@ -78,7 +78,7 @@ fn models(arguments: &Arguments) -> Outcome<()> {
         evaluation,
         wake_model: model.as_ref(),
         text_to_image: None,
-        lpips: lpips.as_ref(),
+        perceptual: &perceptual,
     };
     let report = judged.report(&device, &common.out)?;
     report.write(common)

@@ -69,7 +69,7 @@ pub(crate) struct Options {
 pub(crate) fn run(options: &Options) -> Outcome<()> {
     let common = &options.common;
     let device = device_named(&common.device)?;
-    let lpips = common.lpips(&device)?;
+    let perceptual = common.perceptual(&device)?;
     let mut pipeline = Pipeline::load(&options.weights, &device)?;
     if let Some(lora) = &options.lora {
         pipeline = pipeline.with_lora(lora, 1.0)?;
@@ -102,14 +102,14 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
         .map(|steps| options.way(&pipeline, &view, Some("ddim"), steps));
     let reference = reference.transpose()?;
     let rows = match ways.len() > 1 || reference.is_some() {
-        true => schedulers::rows(&ways, reference.as_ref(), &evaluation, lpips.as_ref())?,
+        true => schedulers::rows(&ways, reference.as_ref(), &evaluation, &perceptual)?,
         false => Vec::new(),
     };
     let judged = Judged {
         evaluation,
         wake_model: wake_model.as_ref(),
         text_to_image: Some(&ways[0].source),
-        lpips: lpips.as_ref(),
+        perceptual: &perceptual,
     };
     let mut report = judged.report(&device, &common.out)?;
     report.schedulers = rows;

@@ -5,7 +5,7 @@ use serde::Serialize;
 use std::time::Instant;
 use wake_physics::{Field, Scene};
 use wake_train::evaluation::{Baseline, Evaluation, ImageSource, PixelRow, TextToImage, Told};
-use wake_train::metrics::Lpips;
+use wake_train::metrics::Perceptual;
 
 /// A model with a named scheduler.
 pub(super) struct Drawn<'a> {
@@ -37,7 +37,7 @@ pub(super) fn rows(
     ways: &[Drawn<'_>],
     reference: Option<&Drawn<'_>>,
     evaluation: &Evaluation<'_>,
-    lpips: Option<&Lpips>,
+    perceptual: &Perceptual,
 ) -> Outcome<Vec<SchedulerRow>> {
     let scenes = evaluation.held_out.scenes(0, evaluation.scenes.min(SCENES));
     let view = &evaluation.view;
@@ -57,7 +57,7 @@ pub(super) fn rows(
             steps: way.source.steps,
             seconds: begin.elapsed().as_secs_f64() / scenes.len() as f64,
             error: exact.as_deref().map(|exact| relative_error(&images, exact)),
-            pixels: PixelRow::of(&way.scheduler, &simulated, &images, lpips),
+            pixels: PixelRow::of(&way.scheduler, &simulated, &images, perceptual),
         })
     };
     ways.iter().map(row).collect()

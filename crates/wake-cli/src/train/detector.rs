@@ -34,10 +34,15 @@ pub(crate) struct Options {
     /// Folder of labelled images with labels.json, instead of a recipe
     #[arg(long, value_name = "DIR", conflicts_with_all = ["recipe", "distinct", "data"])]
     labelled: Option<PathBuf>,
-    /// Labelled image to leave out
-    #[arg(long, value_name = "NAME", requires = "labelled")]
-    without: Option<String>,
-    /// Number of labelled images, in order of name after the one left out [default: all]
+    /// Labelled images to leave out, separated by commas
+    #[arg(
+        long,
+        value_name = "NAMES",
+        value_delimiter = ',',
+        requires = "labelled"
+    )]
+    without: Vec<String>,
+    /// Number of labelled images, in order of name after the first one left out [default: all]
     #[arg(long, value_name = "COUNT", requires = "labelled", value_parser = clap::value_parser!(u32).range(1..))]
     tiles: Option<u32>,
     /// Initial weights [default: random]

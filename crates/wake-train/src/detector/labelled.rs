@@ -24,9 +24,9 @@ const SQUARES: u64 = 0x1A_BE11;
 pub struct LabelledImages {
     /// Folder of images with `labels.json`.
     pub folder: PathBuf,
-    /// Name of the image that is left out, if any.
-    pub without: Option<String>,
-    /// Number of images, taken by name after the one that is left out; `None`: all others.
+    /// Names of the images that are left out.
+    pub without: Vec<String>,
+    /// Number of images, taken by name after the first one that is left out; `None`: all others.
     pub count: Option<usize>,
 }
 
@@ -39,18 +39,21 @@ impl LabelledImages {
     /// [`wake_nn::Error::OutOfRange`] for more images than are left.
     pub fn read(&self) -> Result<Vec<Tile>> {
         let mut tiles = Tile::read_all(&self.folder)?;
-        if let Some(name) = &self.without {
+        let place = |name: &String| {
             let place = tiles.iter().position(|tile| tile.name == *name);
-            let place = place.ok_or_else(|| {
+            place.ok_or_else(|| {
                 let names: Vec<&str> = tiles.iter().map(|tile| tile.name.as_str()).collect();
                 Error::Value(wake_nn::Error::InvalidOption {
                     option: "image left out".to_owned(),
                     value: whole_files::sentence(name),
                     expected: format!("one of {}", names.join(", ")),
                 })
-            })?;
-            tiles.rotate_left(place);
-            tiles.remove(0);
+            })
+        };
+        let places: Vec<usize> = self.without.iter().map(place).collect::<Result<_>>()?;
+        if let Some(&first) = places.first() {
+            tiles.rotate_left(first);
+            tiles.retain(|tile| !self.without.contains(&tile.name));
         }
         if let Some(count) = self.count {
             let most = tiles.len() as f64;
@@ -205,23 +208,25 @@ mod tests {
     fn the_image_that_is_left_out_is_not_learnt_from() {
         let folder = tempfile::tempdir().unwrap();
         folder_of(&NAMES, folder.path());
-        let images = |without: Option<&str>, count| LabelledImages {
+        let images = |without: &[&str], count| LabelledImages {
             folder: folder.path().to_owned(),
-            without: without.map(str::to_owned),
+            without: without.iter().map(|&name| name.to_owned()).collect(),
             count,
         };
-        assert_eq!(names(&images(None, None)), NAMES);
-        assert_eq!(names(&images(Some("c.png"), Some(2))), ["d.png", "a.png"]);
-        assert_eq!(names(&images(Some("a.png"), None)), NAMES[1..]);
-        let unknown = images(Some("e.png"), None).read().unwrap_err().to_string();
+        assert_eq!(names(&images(&[], None)), NAMES);
+        assert_eq!(names(&images(&["c.png"], Some(2))), ["d.png", "a.png"]);
+        assert_eq!(names(&images(&["a.png"], None)), NAMES[1..]);
+        assert_eq!(
+            names(&images(&["c.png", "a.png"], None)),
+            ["d.png", "b.png"]
+        );
+        let unknown = images(&["a.png", "e.png"], None);
+        let unknown = unknown.read().unwrap_err().to_string();
         assert!(
             unknown.contains("e.png") && unknown.contains("d.png"),
             "{unknown}"
         );
-        let many = images(Some("a.png"), Some(4))
-            .read()
-            .unwrap_err()
-            .to_string();
+        let many = images(&["a.png"], Some(4)).read().unwrap_err().to_string();
         assert!(many.contains("labelled images is 4"), "{many}");
     }
 
@@ -232,7 +237,7 @@ mod tests {
         folder_of(&NAMES[..1], folder.path());
         let images = LabelledImages {
             folder: folder.path().to_owned(),
-            without: None,
+            without: Vec::new(),
             count: None,
         };
         let source = source(&images, 3, 64).unwrap();

@@ -11,7 +11,7 @@ use super::source::{ImageSource, Named, Told, other_sea};
 use super::statistics::quantile;
 use super::view::View;
 use crate::error::Result;
-use crate::metrics::Lpips;
+use crate::metrics::Perceptual;
 
 /// Kinds of images after the model, in the order of the tallies.
 const KINDS: [&str; 4] = [
@@ -59,7 +59,7 @@ impl Comparison {
         scenes: &[Scene],
         model: &dyn ImageSource,
         beside: &[Named<'_>],
-        lpips: Option<&Lpips>,
+        perceptual: &Perceptual,
     ) -> Result<()> {
         let view = self.view;
         let draw = |source: &dyn ImageSource, scenes| view.draw(source, scenes, Told::Both);
@@ -80,10 +80,10 @@ impl Comparison {
             let (flat, soft) = (constant(&reference), blur(&second));
             let images = [&model, &second, &gaussian, &flat, &soft];
             for (tally, image) in self.tallies.iter_mut().zip(images) {
-                tally.add(&reference, image, lpips);
+                tally.add(&reference, image, perceptual);
             }
             for (tally, images) in self.tallies[1 + KINDS.len()..].iter_mut().zip(&others) {
-                tally.add(&reference, &view.grey(&images[n]), lpips);
+                tally.add(&reference, &view.grey(&images[n]), perceptual);
             }
             self.simulated.push(view.read(&references[n], scene)?);
             self.generated.push(view.read(&generated[n], scene)?);
@@ -130,6 +130,7 @@ fn equivalent_looks(intensity: &Field, scene: &Scene, view: &View) -> Option<f64
 #[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod tests {
     use super::*;
+    use burn::tensor::Device;
 
     /// Speckle of L looks on a constant image: L, to the scatter of a variance of 256² pixels, some 1 %.
     #[test]
@@ -147,9 +148,10 @@ mod tests {
     fn a_model_that_is_the_simulator_has_its_pixels() {
         let keys = ["grid.rows = 32", "grid.columns = 32"];
         let scene = Scene::default().with_assignments(&keys).unwrap();
+        let perceptual = Perceptual::new(None, &Device::flex()).unwrap();
         let mut comparison = Comparison::default();
         comparison
-            .add(&[scene], &Baseline::Simulator, &[], None)
+            .add(&[scene], &Baseline::Simulator, &[], &perceptual)
             .unwrap();
         let rows = comparison.pixels("model", &[]);
         assert_eq!(rows.len(), 5);
@@ -157,5 +159,29 @@ mod tests {
         assert!(rows[1].ssim.is_some_and(|ssim| ssim < 0.99));
         let [simulator, model] = comparison.looks();
         assert_eq!(simulator, model);
+    }
+
+    /// In the features of the detector, another sea is nearer than a constant and a blurred image, which SSIM prefers.
+    #[test]
+    fn features_tell_lost_texture() {
+        let keys = ["grid.rows = 128", "grid.columns = 128"];
+        let scenes: Vec<Scene> = (0..4)
+            .map(|seed| Scene {
+                seed,
+                ..Scene::default().with_assignments(&keys).unwrap()
+            })
+            .collect();
+        let perceptual = Perceptual::new(None, &Device::flex()).unwrap();
+        let mut comparison = Comparison::default();
+        comparison
+            .add(&scenes, &Baseline::Simulator, &[], &perceptual)
+            .unwrap();
+        let rows = comparison.pixels("model", &[]);
+        let [itself, other_sea] = [0, 1].map(|n| rows[n].features.unwrap());
+        assert!(itself.abs() < 1e-5, "{itself}");
+        for row in &rows[3..] {
+            let lost = row.features.unwrap();
+            assert!(lost > 1.5 * other_sea, "{}: {lost} {other_sea}", row.image);
+        }
     }
 }

@@ -16,7 +16,7 @@ use super::source::{BATCH, ImageSource, Named, Told};
 use super::view::View;
 use super::wake_correlation::{WakeCorrelation, wake_correlation};
 use crate::error::Result;
-use crate::metrics::Lpips;
+use crate::metrics::Perceptual;
 
 /// First index of the scenes whose values are changed, apart from those of the other figures.
 const FIRST_CHANGED: u64 = 1 << 20;
@@ -135,7 +135,7 @@ impl<'a> Evaluation<'a> {
 
     /// Draws all images and computes all figures.
     ///
-    /// - `lpips`: perceptual distance for the pixel figures, as in the paper; left out if `None`
+    /// - `perceptual`: perceptual distances of the pixel figures
     /// - `device`: device of the classifiers, without autodiff
     /// - `step`: called with the name of a part and the number of its steps just done
     ///
@@ -148,14 +148,14 @@ impl<'a> Evaluation<'a> {
     /// When there is no scene.
     pub fn figures(
         &self,
-        lpips: Option<&Lpips>,
+        perceptual: &Perceptual,
         device: &Device,
         step: &dyn Fn(&'static str, u64),
     ) -> Result<Figures> {
         let scenes = self.held_out.scenes(0, self.scenes);
         let mut compared = Comparison::new(self.view);
         for batch in scenes.chunks(BATCH) {
-            compared.add(batch, self.source, &self.beside, lpips)?;
+            compared.add(batch, self.source, &self.beside, perceptual)?;
             step("pixels and values", batch.len() as u64);
         }
         let ablation = ablation(&scenes, &self.kinds(), &self.view, device, || {

@@ -1,4 +1,4 @@
-//! Figures of images against the simulator's image of the same scene: SSIM, PSNR, LPIPS, spectrum, brightness.
+//! Figures of images against the simulator's image of the same scene: SSIM, PSNR, perceptual distances, spectrum, brightness.
 
 use burn::tensor::{Device, Tensor, TensorData};
 use serde::Serialize;
@@ -6,7 +6,7 @@ use wake_physics::Field;
 use wake_physics::measure::{Binning, radial_spectrum};
 
 use super::statistics::mean;
-use crate::metrics::{Lpips, Plane, SsimWindow, blurred, psnr, ssim};
+use crate::metrics::{Perceptual, Plane, SsimWindow, blurred, psnr, ssim};
 
 /// Standard deviation of the blurred baseline [pixels].
 const BLUR: f64 = 4.0;
@@ -34,6 +34,7 @@ pub(super) fn blur(image: &Field) -> Field {
 pub(super) struct PixelTally {
     ssim: Vec<f64>,
     psnr: Vec<f64>,
+    features: Vec<f64>,
     lpips: Vec<f64>,
     mean: Vec<f64>,
     contrast: Vec<f64>,
@@ -50,7 +51,9 @@ pub struct PixelRow {
     pub ssim: Option<f64>,
     /// Peak signal-to-noise ratio of range 1, mean over scenes \[dB\].
     pub psnr_db: Option<f64>,
-    /// Perceptual distance, mean over scenes; `None` without LPIPS weights.
+    /// Distance by the features of the shipped detector, mean over scenes; `None` for images below 64 pixels.
+    pub features: Option<f64>,
+    /// LPIPS, mean over scenes; `None` without its weights.
     pub lpips: Option<f64>,
     /// Mean grey less the reference's, mean over scenes \[1\].
     pub brightness_difference: Option<f64>,
@@ -73,10 +76,10 @@ impl PixelRow {
     ///
     /// If sizes differ.
     #[must_use]
-    pub fn of(name: &str, references: &[Field], images: &[Field], lpips: Option<&Lpips>) -> Self {
+    pub fn of(name: &str, references: &[Field], images: &[Field], perceptual: &Perceptual) -> Self {
         let mut tally = PixelTally::default();
         for (reference, image) in references.iter().zip(images) {
-            tally.add(reference, image, lpips);
+            tally.add(reference, image, perceptual);
         }
         tally.row(name)
     }
@@ -88,12 +91,14 @@ impl PixelTally {
     /// # Panics
     ///
     /// If the sizes differ.
-    pub(super) fn add(&mut self, reference: &Field, image: &Field, lpips: Option<&Lpips>) {
+    pub(super) fn add(&mut self, reference: &Field, image: &Field, perceptual: &Perceptual) {
         let planes = [reference, image].map(|f| Plane::new(&f.values, f.columns));
         self.ssim
             .push(ssim(&planes[0], &planes[1], 1.0, SsimWindow::Gaussian));
         self.psnr.push(psnr(&planes[0], &planes[1], 1.0));
-        if let Some(lpips) = lpips {
+        self.features
+            .extend(perceptual.features.distance(reference, image));
+        if let Some(lpips) = &perceptual.lpips {
             let [a, b] = [reference, image].map(|field| colour(field, lpips.device()));
             self.lpips
                 .extend(lpips.distance(a, b).iter().map(|d| d.total));
@@ -126,6 +131,7 @@ impl PixelTally {
             image: image.to_owned(),
             ssim: mean(&self.ssim),
             psnr_db: mean(&self.psnr),
+            features: mean(&self.features),
             lpips: mean(&self.lpips),
             brightness_difference: mean(&self.mean),
             contrast_ratio: mean(&self.contrast),
@@ -161,6 +167,7 @@ fn colour(image: &Field, device: &Device) -> Tensor<4> {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod tests {
     use super::*;
     use wake_nn::noise::NoiseSource;
@@ -185,7 +192,9 @@ mod tests {
             columns: side,
             values: noise.iter().map(|x| 0.5 + contrast * x).collect(),
         };
-        let row = PixelRow::of("twice the contrast", &[image(0.05)], &[image(0.1)], None);
+        let perceptual = Perceptual::new(None, &Device::flex()).unwrap();
+        let [one, other] = [0.05, 0.1].map(image);
+        let row = PixelRow::of("twice the contrast", &[one], &[other], &perceptual);
         let expected = 20.0 * 2f64.log10();
         // Ring 0 holds the mean.
         for db in &row.spectrum_curve_db[1..] {
@@ -195,6 +204,7 @@ mod tests {
             assert!((db - expected).abs() < 1e-3, "{row:?}");
         }
         assert!(row.contrast_ratio.is_some_and(|r| (r - 2.0).abs() < 1e-5));
-        assert!(row.lpips.is_none());
+        // Smaller than the network's inputs, and no weights.
+        assert!(row.features.is_none() && row.lpips.is_none());
     }
 }

@@ -208,8 +208,13 @@ impl Report {
             count: tiles.len(),
             megapixels: pixels.sum::<usize>() as f64 * 1e-6,
             check: Check::of("real tiles", &probabilities, &outcomes),
-            calibration_error: bootstrap(&groups, |found| found.calibration_error),
-            brier_less_constant: bootstrap(&groups, |found| found.brier - found.brier_of_constant),
+            calibration_error: bootstrap(&groups, |drawn| {
+                Some(Reliability::of(&drawn.concat())?.calibration_error)
+            }),
+            brier_less_constant: bootstrap(&groups, |drawn| {
+                let found = Reliability::of(&drawn.concat())?;
+                Some(found.brier - found.brier_of_constant)
+            }),
             false_alarms: outcomes.iter().filter(sure).filter(|one| !one.wake).count(),
             found: [
                 outcomes.iter().filter(sure).filter(|one| one.wake).count(),
@@ -243,7 +248,7 @@ impl Report {
         let mut text = format!(
             "<!-- Written by: wake evaluate calibration --images {0} --checked {1}{real} -->\n\n\
              # Probabilities of detections\n\n\
-             The score threshold of *sure* detections keeps false alarms on simulated sea without ships ({5} images) to at most {4} per \
+             {7}The score threshold of *sure* detections keeps false alarms on simulated sea without ships ({5} images) to at most {4} per \
              1,000 km². `probability` is the chance of a wake in either direction, `direction_probability` the chance that tip and end \
              are not confused. Where wakes are rarer than in the images of the fit, `probability` is too high.\n\n\
              Fit: beta calibration on {2} simulated and as many painted images; check: {3} others of each kind. Weights: CRC-32 {6}. \
@@ -255,6 +260,7 @@ impl Report {
             self.false_alarms,
             self.images,
             self.weights,
+            self.result(),
         );
         for mode in &self.modes {
             // Writing into a string cannot fail.
@@ -265,6 +271,34 @@ impl Report {
             tiles.write(&mut text);
         }
         text
+    }
+
+    /// Ranges of calibration error and Brier scores of `probability` over all simulated and painted images, and the error on
+    /// real tiles; empty without any detections.
+    fn result(&self) -> String {
+        let checks = self.modes.iter().flat_map(|mode| &mode.checks);
+        let wakes: Vec<&Reliability> = checks.filter_map(|check| check.wake.as_ref()).collect();
+        if wakes.is_empty() {
+            return String::new();
+        }
+        let range = |figure: fn(&Reliability) -> f64| {
+            let figures = wakes.iter().map(|found| figure(found));
+            let [least, most] = figures.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| {
+                [a.min(x), b.max(x)]
+            });
+            format!("{least:.2} to {most:.2}")
+        };
+        let tiles = self.tiles.as_ref();
+        let real = tiles.and_then(|tiles| Some((tiles.count, tiles.check.wake.as_ref()?)));
+        let real = real.map_or(String::new(), |(count, found)| {
+            format!(", {:.2} on {count} real tiles", found.calibration_error)
+        });
+        format!(
+            "On simulated and painted images, `probability` is off by {} in the mean{real} (Brier score: {}; a constant: {}). ",
+            range(|found| found.calibration_error),
+            range(|found| found.brier),
+            range(|found| found.brier_of_constant),
+        )
     }
 }
 

@@ -34,16 +34,17 @@ pub(super) fn ablation(report: &Report) -> String {
 
 pub(super) fn pixels(report: &Report) -> String {
     let mut text = "## Pixels, against a simulated image of the same scene\n\n\
-        | image | SSIM | PSNR dB | LPIPS | brightness | contrast ratio | spectrum dB | in thirds |\n\
-        | --- | --- | --- | --- | --- | --- | --- | --- |\n"
+        | image | SSIM | PSNR dB | features | LPIPS | brightness | contrast ratio | spectrum dB | in thirds |\n\
+        | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
         .to_owned();
     for r in &report.figures.pixels {
         let [low, middle, high] = r.bands_db;
         text += &format!(
-            "| {} | {} | {} | {} | {} | {} | {} | {low:.1}, {middle:.1}, {high:.1} |\n",
+            "| {} | {} | {} | {} | {} | {} | {} | {} | {low:.1}, {middle:.1}, {high:.1} |\n",
             r.image,
             number(r.ssim, 4),
             number(r.psnr_db, 2),
+            number(r.features, 4),
             number(r.lpips, 4),
             number(r.brightness_difference, 4),
             number(r.contrast_ratio, 3),
@@ -52,9 +53,10 @@ pub(super) fn pixels(report: &Report) -> String {
     }
     let (model, simulator) = (&report.figures.pixels[0], &report.figures.pixels[1]);
     text += &format!(
-        "\nModel over simulator: SSIM {}, PSNR {}, LPIPS {}. Good is 0.9 to 1.1: as close as another simulated image.\n",
+        "\nModel over simulator: SSIM {}, PSNR {}, features {}, LPIPS {}. Good is 0.9 to 1.1: as close as another simulated image.\n",
         ratio(model.ssim, simulator.ssim),
         ratio(model.psnr_db, simulator.psnr_db),
+        ratio(model.features, simulator.features),
         ratio(model.lpips, simulator.lpips)
     );
     text + &format!(

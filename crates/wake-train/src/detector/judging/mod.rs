@@ -9,6 +9,7 @@
 //!
 //! The rules and the curves are those of [`score`](wake_detector::score).
 
+mod bootstrap;
 mod compared;
 mod empty_sea;
 mod open_sea;
@@ -17,10 +18,11 @@ mod reliability;
 mod simulated;
 mod tiles;
 
+pub use bootstrap::bootstrap;
 pub use compared::compared;
 pub use empty_sea::{EmptySea, score_for};
 pub use open_sea::{open_windows, paired_windows};
 pub use outcomes::{DetectionOutcome, KnownImages, Spacing, outcomes};
-pub use reliability::{Reliability, ReliabilityBin, bootstrap};
+pub use reliability::{Reliability, ReliabilityBin};
 pub use simulated::{Searched, known};
 pub use tiles::Tile;

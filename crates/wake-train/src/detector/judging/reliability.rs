@@ -1,7 +1,6 @@
 //! Reliability of predicted probabilities.
 
 use serde::Serialize;
-use wake_nn::noise::NoiseSource;
 
 /// Predictions with neighbouring probabilities.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -31,10 +30,6 @@ pub struct Reliability {
 
 /// Number of bins.
 const BINS: usize = 10;
-/// Draws of a bootstrap and their seed.
-const DRAWS: u32 = 1000;
-const SEED: u64 = 5;
-
 impl Reliability {
     /// The reliability of predictions, each a probability and whether it was right; `None` without any.
     ///
@@ -82,53 +77,9 @@ impl Reliability {
     }
 }
 
-/// The 95 % bootstrap interval of a figure, drawing groups of predictions with replacement.
-///
-/// - `groups`: predictions that depend on each other, such as those of an image
-///
-/// # References
-///
-/// Efron & Tibshirani (1993), "An Introduction to the Bootstrap", chapter 13 (percentile interval).
-#[must_use]
-pub fn bootstrap(
-    groups: &[Vec<(f64, bool)>],
-    figure: impl Fn(&Reliability) -> f64,
-) -> Option<[f64; 2]> {
-    let draws = NoiseSource::new(SEED);
-    let draw = |n: u32| -> Option<f64> {
-        let one = |k: u64| {
-            let at = draws.uniform(n, k) * groups.len() as f64;
-            &groups[at as usize]
-        };
-        let drawn: Vec<(f64, bool)> = (0..groups.len() as u64).flat_map(one).copied().collect();
-        Reliability::of(&drawn).map(|found| figure(&found))
-    };
-    let mut figures: Vec<f64> = (0..DRAWS).filter_map(draw).collect();
-    figures.sort_by(f64::total_cmp);
-    let at = |share: f64| {
-        figures
-            .get((share * figures.len() as f64) as usize)
-            .copied()
-    };
-    Some([at(0.025)?, at(0.975)?])
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// The mean of 400 independent outcomes of 0.3: ± 1.96 · √(0.21/400) = 0.045, to a tenth of that for 1,000 draws.
-    #[test]
-    fn the_interval_of_a_share_is_that_of_the_binomial() {
-        let groups: Vec<Vec<(f64, bool)>> = (0..400).map(|k| vec![(0.0, k % 10 < 3)]).collect();
-        // With a probability of 0 the Brier score is the share that was right.
-        let [low, high] = bootstrap(&groups, |found| found.brier).unwrap();
-        assert!(
-            (low - 0.255).abs() < 0.006 && (high - 0.345).abs() < 0.006,
-            "{low} {high}"
-        );
-        assert!(bootstrap(&[], |found| found.brier).is_none());
-    }
 
     /// Ten predictions of 0.25 of which four were right, and ten of 0.8 of which all were: the figures by hand.
     #[test]
