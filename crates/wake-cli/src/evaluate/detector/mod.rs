@@ -101,6 +101,11 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
     whole_files::make_folder(&options.out)?;
     let mut report = Report {
         rungs: options.rung.iter().map(|(name, _)| name.clone()).collect(),
+        left_out: options
+            .left_out
+            .iter()
+            .map(|(name, _)| name.clone())
+            .collect(),
         ..Report::default()
     };
     let mut speeds = String::new();

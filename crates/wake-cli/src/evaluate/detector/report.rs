@@ -19,6 +19,8 @@ pub(crate) struct Report {
     pub(crate) rows: Vec<Value>,
     /// Names of other trainings.
     pub(crate) rungs: Vec<String>,
+    /// Names of trainings of which each tile was left out in turn.
+    pub(crate) left_out: Vec<String>,
     /// Accuracies of the two-sample test.
     pub(crate) sea: Vec<Value>,
     /// Recall by visibility.
@@ -131,13 +133,23 @@ impl Report {
             true => "",
             false => " --rung NAME=FILE …",
         };
+        let (left_out, meaning) = match self.left_out.is_empty() {
+            true => ("", String::new()),
+            false => (
+                " --left-out NAME=DIR …",
+                format!(
+                    "- {}: each tile searched by a network that was not trained on it ([few labels](../detector.md#a-few-labels))\n",
+                    self.left_out.join(", ")
+                ),
+            ),
+        };
         let mut text = format!(
-            "<!-- Written by: wake evaluate detector --images {count} --real DIR{rungs} -->\n\n# Finding wakes\n\n{}\n\n\
+            "<!-- Written by: wake evaluate detector --images {count} --real DIR{rungs}{left_out} -->\n\n# Finding wakes\n\n{}\n\n\
              - AP: average precision by the ray rule: axis within 10°; tip within 60 pixels, or axis line within 25 pixels of the \
              label's tip and middle\n\
              - 95 %: interval of AP by bootstrap over the images\n\
              - AP boxes: average precision of oriented boxes from the tip to the visible end, IoU 0.5\n\
-             - Recall: at half a false alarm per image, which the last column's score allows\n\n\
+             - Recall: at half a false alarm per image, which the last column's score allows\n{meaning}\n\
              | images | number | wakes | found by | AP | 95 % | AP boxes | recall | at score |\n\
              | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
             self.lead()
