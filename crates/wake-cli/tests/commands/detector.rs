@@ -272,6 +272,85 @@ fn a_data_set_is_trained_on() {
     );
 }
 
+/// A few labelled images: a network is trained without two of three, and judged on images that it has not seen.
+#[test]
+fn labelled_images_are_trained_on_and_left_out() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    std::fs::create_dir(at("real")).expect("a folder");
+    let names = ["a.png", "b.png", "c.png"];
+    let mut images = Vec::new();
+    for (name, grey) in names.iter().zip([90u8, 100, 110]) {
+        let line = |x: u32, y: u32| {
+            if x.abs_diff(y) < 4 {
+                30
+            } else {
+                grey + ((x * y) % 23) as u8
+            }
+        };
+        let image = GrayImage::from_fn(256, 256, |x, y| Luma([line(x, y)]));
+        image.save(at("real").join(name)).expect("an image");
+        images.push(format!(
+            r#""{name}": {{"width": 256, "height": 256, "wakes": [
+                {{"tip": [20, 20], "axis_deg": 135, "length_px": 300, "confidence": "clear"}}]}}"#
+        ));
+    }
+    let labels = format!(r#"{{"images": {{{}}}}}"#, images.join(", "));
+    std::fs::write(at("real/labels.json"), labels).expect("labels");
+    // Without open sea there are no classifiers to train.
+    for name in ["a", "b", "c"] {
+        let mask = GrayImage::from_pixel(256, 256, Luma([255]));
+        let path = at("real").join(format!("{name}_mask.png"));
+        mask.save(path).expect("a mask");
+    }
+    let real = at("real");
+    let train = [
+        "detector",
+        "--labelled",
+        text(&real),
+        "--without",
+        "a.png,c.png",
+        "--batch",
+        "2",
+        "--steps",
+        "1",
+        "--every",
+        "1",
+    ];
+    done("train", &train, &at("run"));
+    let run = std::fs::read_to_string(at("run/run.json")).expect("a run");
+    assert!(
+        run.contains("a.png") && run.contains("c.png") && !run.contains("b.png"),
+        "{run}"
+    );
+    for name in ["a", "b", "c"] {
+        std::fs::create_dir_all(at("left_out").join(name)).expect("a folder");
+        let weights = at("left_out").join(name).join("detector.safetensors");
+        std::fs::copy(at("run/detector.safetensors"), weights).expect("a copy");
+    }
+    let rows = format!("few={}", text(&at("left_out")));
+    let evaluate = [
+        "detector",
+        "--images",
+        "1",
+        "--real",
+        text(&real),
+        "--left-out",
+        &rows,
+    ];
+    let printed = done("evaluate", &evaluate, &at("report"));
+    assert!(
+        printed.contains("| real, clear wakes | 3 | 3 | few |"),
+        "{printed}"
+    );
+    assert!(
+        printed.contains("--left-out NAME=DIR") && printed.contains("- few: each tile"),
+        "{printed}"
+    );
+    std::fs::remove_file(at("left_out/b/detector.safetensors")).expect("a file less");
+    refused_by("evaluate", &evaluate, &["left_out/b/detector.safetensors"]);
+}
+
 /// Runs the program in a folder, with its standard output somewhere else.
 fn inside(folder: &Path, arguments: &[&str], stdout: Stdio) -> Output {
     let child = program("")

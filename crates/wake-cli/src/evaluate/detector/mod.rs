@@ -98,6 +98,15 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
             (tiles, sea)
         }
     };
+    // One network per tile, read before the search begins.
+    let mut left_out: Vec<(&str, Vec<Box<dyn Finder>>)> = Vec::new();
+    for (name, runs) in &options.left_out {
+        let of_tile = |tile: &Tile| {
+            let folder = runs.join(Path::new(&tile.name).with_extension(""));
+            network(Some(&folder.join("detector.safetensors")))
+        };
+        left_out.push((name, tiles.iter().map(of_tile).collect::<Outcome<_>>()?));
+    }
     whole_files::make_folder(&options.out)?;
     let mut report = Report {
         rungs: options.rung.iter().map(|(name, _)| name.clone()).collect(),
@@ -121,12 +130,7 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
             real::judge(name, |_| finder.as_ref(), &tiles, &options.out, &mut report)?;
         }
     }
-    for (name, runs) in &options.left_out {
-        let of_tile = |tile: &Tile| {
-            let folder = runs.join(Path::new(&tile.name).with_extension(""));
-            network(Some(&folder.join("detector.safetensors")))
-        };
-        let finders: Vec<Box<dyn Finder>> = tiles.iter().map(of_tile).collect::<Outcome<_>>()?;
+    for (name, finders) in &left_out {
         let finder = |n: usize| finders[n].as_ref();
         real::judge(name, finder, &tiles, &options.out, &mut report)?;
     }
