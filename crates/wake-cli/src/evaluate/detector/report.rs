@@ -98,7 +98,10 @@ impl Report {
 
     /// The first paragraph: the results.
     fn lead(&self) -> String {
-        let pair = |images| Some([self.row(images, "network")?, self.row(images, "Radon")?]);
+        // Images without any wake have no average precision.
+        let judged = |row: &&Value| row["average_precision"].is_number();
+        let row = |images, finder| self.row(images, finder).filter(judged);
+        let pair = |images| Some([row(images, "network")?, row(images, "Radon")?]);
         let number = |row: &Value, key: &str| row[key].as_f64().unwrap_or(f64::NAN);
         let precisions = |rows: [&Value; 2]| rows.map(|row| number(row, "average_precision"));
         let mut text = String::new();
