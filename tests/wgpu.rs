@@ -1,7 +1,7 @@
 //! A small part of the parity suite on wgpu: the models, one whole run, and the self-checks, which draw an image of the wake model,
 //! run the detector and compute the gradients of a training step.
 //!
-//! Runs wherever wgpu finds a device; Mesa's software OpenGL is one (`.ci/run` says how), some hundred times slower
+//! Runs wherever wgpu finds a device; Mesa's software OpenGL is one (`.ci/wgpu` installs it), some hundred times slower
 //! than flex, so only the smallest cases of the fixtures are taken. Differences are allowed up to 1e-3 of the largest
 //! value: GPUs may multiply matrices in half-precision fragments.
 #![allow(clippy::unwrap_used, reason = "in tests, a panic is the report")]

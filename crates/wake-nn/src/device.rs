@@ -58,14 +58,14 @@ pub fn device_named(name: &str) -> Result<Device> {
         ("wgpu", Some(number)) => {
             let device = Device::wgpu(DeviceKind::DiscreteGpu(number));
             let found = Device::enumerate(DeviceType::Wgpu);
-            there(name, found.len(), found.iter().any(|one| *one == device))?;
+            there(name, found.len(), found.contains(&device))?;
             Ok(device)
         }
         #[cfg(feature = "cuda")]
         ("cuda", number) => {
             let device = Device::cuda(number.unwrap_or(0));
             let found = Device::enumerate(DeviceType::Cuda);
-            there(name, found.len(), found.iter().any(|one| *one == device))?;
+            there(name, found.len(), found.contains(&device))?;
             Ok(device)
         }
         _ => Err(unknown()),

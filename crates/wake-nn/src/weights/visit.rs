@@ -80,6 +80,10 @@ fn as_in_file<const D: usize>(tensor: Tensor<D>, transposed: bool) -> Tensor<D> 
 
 /// Change of a parameter.
 #[derive(Debug)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "there is one at a time; a tensor's handle is large where wgpu is built"
+)]
 pub enum Change {
     /// No change.
     Kept,
