@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use wake_dataset::{Loader, Recipe, Simulated, Source};
 use wake_ldm::{Sampled, WakeSampler};
 use wake_nn::device_named;
@@ -14,8 +14,9 @@ use crate::exit::Outcome;
 const THREADS: [usize; 5] = [1, 2, 4, 8, 16];
 /// Images per batch.
 const BATCH: usize = 16;
-/// Batches that are timed, after as many warm-up batches as there are threads.
-const BATCHES: usize = 8;
+/// Least number of batches, and least time, that are measured, after as many warm-up batches as there are threads.
+const BATCHES: usize = 4;
+const LEAST: Duration = Duration::from_secs(5);
 /// Seed of both sources, whose scenes are those of the recipe `satellites`.
 const SEED: u64 = 3;
 
@@ -77,10 +78,15 @@ fn images_per_second(source: Arc<dyn Source>, threads: usize, device: &str) -> O
         batch?;
     }
     let begin = Instant::now();
-    for batch in batches.take(BATCHES) {
+    let mut made = 0;
+    for batch in batches {
         batch?;
+        made += 1;
+        if made >= BATCHES && begin.elapsed() >= LEAST {
+            break;
+        }
     }
-    Ok((BATCH * BATCHES) as f64 / begin.elapsed().as_secs_f64())
+    Ok((BATCH * made) as f64 / begin.elapsed().as_secs_f64())
 }
 
 /// Markdown table of images per second by number of threads.

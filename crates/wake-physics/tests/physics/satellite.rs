@@ -221,8 +221,8 @@ fn weak_extras_are_left_out_and_change_less_than_estimated() {
     }
 }
 
-/// Needed against all, same seed, with and without an echo, for every satellite at spacings below, around and above that at
-/// which its pixels no longer correlate, 1.1 to 1.5 resolutions: the change stays below the estimate.
+/// Needed against all, same seed, for every satellite at spacings below, around and above that at which its pixels no longer
+/// correlate, 1.1 to 1.5 resolutions, with and without an echo in turn: the change stays below the estimate.
 #[test]
 fn what_is_left_out_changes_less_than_estimated_for_every_satellite() {
     for (n, sensor) in Sensor::ALL.into_iter().enumerate() {
@@ -232,31 +232,30 @@ fn what_is_left_out_changes_less_than_estimated_for_every_satellite() {
             .azimuth_resolution
             .max(mode.range_resolution_at(mode.incidence));
         for (m, pixels) in [0.9, 1.1, 1.2, 1.3, 1.5, 2.1].into_iter().enumerate() {
-            for echo in [false, true] {
-                let scene = small(
-                    24,
-                    24,
-                    &[
-                        &format!("radar.sensor={}", name.as_str().unwrap()),
-                        &format!("grid.spacing={}", f64::min(pixels * coarser, 100.0)),
-                        &format!("ship.echo={echo}"),
-                        &format!("seed={}", 10 * n + m),
-                        "ship.heading=0",
-                        "ship.speed=4",
-                    ],
-                );
-                let needed = simulate(&scene).unwrap();
-                let all = simulate(&scene.with_assignments(&["model.terms=all"]).unwrap());
-                let all = all.unwrap();
-                let left_out = needed.plan.left_out();
-                assert!(left_out <= scene.model.tolerance, "{sensor:?} {pixels}");
-                let change = needed.intensity.difference(&all.intensity).1 / all.intensity.mean();
-                assert!(
-                    change <= left_out + 0.01 * scene.model.tolerance,
-                    "{sensor:?} at {pixels} resolutions, echo {echo}: {change} above {left_out}\n{}",
-                    needed.plan
-                );
-            }
+            let echo = (n + m) % 2 == 0;
+            let scene = small(
+                24,
+                24,
+                &[
+                    &format!("radar.sensor={}", name.as_str().unwrap()),
+                    &format!("grid.spacing={}", f64::min(pixels * coarser, 100.0)),
+                    &format!("ship.echo={echo}"),
+                    &format!("seed={}", 10 * n + m),
+                    "ship.heading=0",
+                    "ship.speed=4",
+                ],
+            );
+            let needed = simulate(&scene).unwrap();
+            let all = simulate(&scene.with_assignments(&["model.terms=all"]).unwrap());
+            let all = all.unwrap();
+            let left_out = needed.plan.left_out();
+            assert!(left_out <= scene.model.tolerance, "{sensor:?} {pixels}");
+            let change = needed.intensity.difference(&all.intensity).1 / all.intensity.mean();
+            assert!(
+                change <= left_out + 0.01 * scene.model.tolerance,
+                "{sensor:?} at {pixels} resolutions, echo {echo}: {change} above {left_out}\n{}",
+                needed.plan
+            );
         }
     }
 }
