@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use wake_train::detector::{DetectorTraining, ImageRecipe, LabelledImages, TrainingImages};
+use wake_train::detector::{
+    DetectorTraining, ImageRecipe, LabelledImages, MadeImages, TrainingImages,
+};
 
 use super::options::{Pace, Place, Thrift};
 use super::screen::Screen;
@@ -22,17 +24,17 @@ pub(crate) const DEFAULTS: &[(&str, &str)] = &[
 /// Train the detector on images made on the fly, or on a data set.
 #[derive(Args)]
 pub(crate) struct Options {
-    /// Recipe of the training images
-    #[arg(long, default_value = ImageRecipe::Mixed.name(), value_parser = named::recipe())]
-    recipe: ImageRecipe,
-    /// Number of different images, which repeat in turn [default: no image repeats]
+    /// Recipe of the training images, with --labelled of every other one [default: mixed, with --labelled none]
+    #[arg(long, value_parser = named::recipe())]
+    recipe: Option<ImageRecipe>,
+    /// Number of different images of the recipe, which repeat in turn [default: no image repeats]
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(16..=1_000_000))]
     distinct: Option<u32>,
     /// Folder of a data set of `wake dataset` with images of 256 x 256 pixels, instead of a recipe
     #[arg(long, value_name = "DIR", conflicts_with_all = ["recipe", "distinct"])]
     data: Option<PathBuf>,
-    /// Folder of labelled images with labels.json, instead of a recipe
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["recipe", "distinct", "data"])]
+    /// Folder of labelled images with labels.json, instead of a recipe, or beside the one given
+    #[arg(long, value_name = "DIR", conflicts_with = "data")]
     labelled: Option<PathBuf>,
     /// Labelled images to leave out, separated by commas
     #[arg(
@@ -59,17 +61,21 @@ pub(crate) struct Options {
 impl Options {
     /// The training images; clap rejects conflicting options.
     fn images(&self) -> TrainingImages {
+        let made = MadeImages {
+            recipe: self.recipe.unwrap_or_default(),
+            distinct: self.distinct.map(|count| count as usize),
+        };
+        let labelled = |folder: &PathBuf| LabelledImages {
+            folder: folder.clone(),
+            without: self.without.clone(),
+            count: self.tiles.map(|count| count as usize),
+        };
+        let beside = self.recipe.is_some() || self.distinct.is_some();
         match (&self.labelled, &self.data) {
-            (Some(folder), _) => TrainingImages::Labelled(LabelledImages {
-                folder: folder.clone(),
-                without: self.without.clone(),
-                count: self.tiles.map(|count| count as usize),
-            }),
+            (Some(folder), _) if beside => TrainingImages::Both(labelled(folder), made),
+            (Some(folder), _) => TrainingImages::Labelled(labelled(folder)),
             (None, Some(folder)) => TrainingImages::Data(folder.clone()),
-            (None, None) => TrainingImages::Recipe {
-                recipe: self.recipe,
-                distinct: self.distinct.map(|count| count as usize),
-            },
+            (None, None) => TrainingImages::Recipe(made),
         }
     }
 }

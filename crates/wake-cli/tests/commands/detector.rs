@@ -323,6 +323,13 @@ fn labelled_images_are_trained_on_and_left_out() {
         run.contains("a.png") && run.contains("c.png") && !run.contains("b.png"),
         "{run}"
     );
+    let beside = [&train[..], &["--recipe", "painted", "--distinct", "16"]].concat();
+    done("train", &beside, &at("both"));
+    let both = std::fs::read_to_string(at("both/run.json")).expect("a run");
+    assert!(
+        both.contains("a.png") && both.contains("painted") && !run.contains("painted"),
+        "{both}"
+    );
     for name in ["a", "b", "c"] {
         std::fs::create_dir_all(at("left_out").join(name)).expect("a folder");
         let weights = at("left_out").join(name).join("detector.safetensors");

@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::path::PathBuf;
 
+use serde_json::{Value, json};
 use wake_dataset::{Grey, Pair, Source};
 use wake_detector::{GreyImage, Wake};
 use wake_physics::Scene;
@@ -61,6 +62,11 @@ impl LabelledImages {
             tiles.truncate(count);
         }
         Ok(tiles)
+    }
+
+    /// Identity of the selection, for the record of a run.
+    pub(super) fn identity(&self) -> Value {
+        json!({"without": self.without, "count": self.count})
     }
 }
 

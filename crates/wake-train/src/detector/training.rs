@@ -13,6 +13,7 @@ use whole_files::fingerprint;
 
 use super::data::TrainingData;
 use super::draw::Draw;
+use super::in_turn::InTurn;
 use super::labelled::{self, LabelledImages};
 use super::recipes::ImageRecipe;
 use super::repeated::Repeated;
@@ -111,28 +112,31 @@ impl Task<Network> for DetectorTask {
     }
 }
 
+/// Images made on the fly.
+#[derive(Debug, Clone, Default)]
+pub struct MadeImages {
+    /// Recipe of the images.
+    pub recipe: ImageRecipe,
+    /// Number of different images, repeated endlessly; `None`: all are different.
+    pub distinct: Option<usize>,
+}
+
 /// Training images of a detector.
 #[derive(Debug, Clone)]
 pub enum TrainingImages {
     /// Images made on the fly.
-    Recipe {
-        /// Recipe of the images.
-        recipe: ImageRecipe,
-        /// Number of different images, repeated endlessly; `None`: all are different.
-        distinct: Option<usize>,
-    },
+    Recipe(MadeImages),
     /// The training pairs of a folder that `wake dataset` made.
     Data(PathBuf),
     /// A few labelled images.
     Labelled(LabelledImages),
+    /// A few labelled images in every other place of a batch, images made on the fly in the others.
+    Both(LabelledImages, MadeImages),
 }
 
 impl Default for TrainingImages {
     fn default() -> Self {
-        Self::Recipe {
-            recipe: ImageRecipe::default(),
-            distinct: None,
-        }
+        Self::Recipe(MadeImages::default())
     }
 }
 
@@ -213,29 +217,40 @@ impl DetectorTraining {
     }
 }
 
+impl MadeImages {
+    /// Source of the pairs, and their identity for the record of a run.
+    fn source(&self, options: &StageOptions) -> Result<(Arc<dyn Source>, Value)> {
+        let Self { recipe, distinct } = self;
+        let source = recipe.source(options.seed, SIZE, &options.device())?;
+        let source: Arc<dyn Source> = match distinct {
+            Some(count) => Arc::new(Repeated::new(source, *count)),
+            None => source,
+        };
+        let noted = json!({"recipe": recipe.name(), "distinct": distinct});
+        Ok((source, noted))
+    }
+}
+
 impl TrainingImages {
     /// Source of the pairs, and their identity for the record of a run.
     fn source(&self, options: &StageOptions) -> Result<(Arc<dyn Source>, Value)> {
         let seed = options.seed;
         Ok(match self {
-            Self::Recipe { recipe, distinct } => {
-                let source = recipe.source(seed, SIZE, &options.device())?;
-                let source: Arc<dyn Source> = match distinct {
-                    Some(count) => Arc::new(Repeated::new(source, *count)),
-                    None => source,
-                };
-                let noted = json!({"recipe": recipe.name(), "distinct": distinct});
-                (source, noted)
-            }
+            Self::Recipe(made) => made.source(options)?,
             Self::Data(folder) => {
                 let data = TrainingData::open(folder, seed, SIZE)?;
                 let noted = json!({"data": data.identity()});
                 (Arc::new(data), noted)
             }
             Self::Labelled(images) => {
-                let LabelledImages { without, count, .. } = images;
-                let noted = json!({"labelled": {"without": without, "count": count}});
+                let noted = json!({"labelled": images.identity()});
                 (Arc::new(labelled::source(images, seed, SIZE)?), noted)
+            }
+            Self::Both(images, made) => {
+                let labelled = labelled::source(images, seed, SIZE)?;
+                let (made, mut noted) = made.source(options)?;
+                noted["labelled"] = images.identity();
+                (Arc::new(InTurn::new(Arc::new(labelled), made)), noted)
             }
         })
     }
@@ -252,10 +267,10 @@ mod tests {
         let shipped = wake_detector::Detector::pretrained_weights();
         std::fs::write(&start, shipped).expect("a file");
         let training = DetectorTraining {
-            images: TrainingImages::Recipe {
+            images: TrainingImages::Recipe(MadeImages {
                 recipe: ImageRecipe::Painted,
                 distinct: None,
-            },
+            }),
             weights: Some(start),
             options: StageOptions {
                 steps: Some(2),
