@@ -14,8 +14,7 @@ use crate::exit::Outcome;
 const THREADS: [usize; 5] = [1, 2, 4, 8, 16];
 /// Images per batch.
 const BATCH: usize = 16;
-/// Least number of batches, and least time, that are measured, after as many warm-up batches as there are threads.
-const BATCHES: usize = 4;
+/// Least time that is measured, with at least a batch of each thread, after as many warm-up batches.
 const LEAST: Duration = Duration::from_secs(5);
 /// Seed of both sources, whose scenes are those of the recipe `satellites`.
 const SEED: u64 = 3;
@@ -82,7 +81,7 @@ fn images_per_second(source: Arc<dyn Source>, threads: usize, device: &str) -> O
     for batch in batches {
         batch?;
         made += 1;
-        if made >= BATCHES && begin.elapsed() >= LEAST {
+        if made >= threads && begin.elapsed() >= LEAST {
             break;
         }
     }
