@@ -10,7 +10,6 @@ mod clear;
 mod cluttered;
 mod data;
 mod draw;
-mod in_turn;
 mod labelled;
 mod painted;
 mod recipes;

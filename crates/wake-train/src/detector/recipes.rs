@@ -213,7 +213,7 @@ fn clear(recipe: Recipe, seed: u64, size: usize) -> wake_dataset::Result<Clear> 
 }
 
 /// Images of all parts in turn.
-fn in_turn<const N: usize>(
+pub(super) fn in_turn<const N: usize>(
     parts: [wake_dataset::Result<Arc<dyn Source>>; N],
 ) -> wake_dataset::Result<Arc<dyn Source>> {
     let parts = parts.into_iter().map(|part| Ok((1.0, part?)));

@@ -13,9 +13,8 @@ use whole_files::fingerprint;
 
 use super::data::TrainingData;
 use super::draw::Draw;
-use super::in_turn::InTurn;
 use super::labelled::{self, LabelledImages};
-use super::recipes::ImageRecipe;
+use super::recipes::{ImageRecipe, in_turn};
 use super::repeated::Repeated;
 use super::sample::Sample;
 use super::targets::{Batch, Prepared};
@@ -250,7 +249,7 @@ impl TrainingImages {
                 let labelled = labelled::source(images, seed, SIZE)?;
                 let (made, mut noted) = made.source(options)?;
                 noted["labelled"] = images.identity();
-                (Arc::new(InTurn::new(Arc::new(labelled), made)), noted)
+                (in_turn([Ok(made), Ok(Arc::new(labelled))])?, noted)
             }
         })
     }
@@ -283,6 +282,37 @@ mod tests {
         let file = run.join(WEIGHTS);
         wake_detector::Detector::load(&file, &Device::default()).expect("finite weights");
         std::fs::read(file).expect("weights")
+    }
+
+    /// Labelled images and made ones take turns, each from its own source.
+    #[test]
+    fn every_other_image_is_labelled() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let image = image::GrayImage::from_fn(256, 256, |x, y| image::Luma([(x ^ y) as u8]));
+        image.save(folder.path().join("a.png")).expect("an image");
+        let labels = r#"{"images": {"a.png": {"width": 256, "height": 256, "wakes": []}}}"#;
+        std::fs::write(folder.path().join("labels.json"), labels).expect("labels");
+        let labelled = LabelledImages {
+            folder: folder.path().to_owned(),
+            without: Vec::new(),
+            count: None,
+        };
+        let made = MadeImages {
+            recipe: ImageRecipe::Painted,
+            distinct: Some(2),
+        };
+        let pairs = |images: TrainingImages, count| {
+            let (source, _) = images.source(&StageOptions::default()).expect("a source");
+            source.items(0..count).expect("pairs")
+        };
+        let both = pairs(TrainingImages::Both(labelled.clone(), made.clone()), 4);
+        let labelled = pairs(TrainingImages::Labelled(labelled), 2);
+        let made = pairs(TrainingImages::Recipe(made), 2);
+        for n in 0..2 {
+            assert!(both[2 * n].image == labelled[n].image, "{n}");
+            assert!(both[2 * n + 1].image == made[n].image, "{n}");
+        }
+        assert!(made[0].image != labelled[0].image);
     }
 
     /// Gradient checkpointing gives the same weights; gradients in bfloat16 give others.
