@@ -11,13 +11,11 @@ use rayon::prelude::*;
 use super::arch::arch;
 use super::columns::columns;
 use super::product::Rows;
-use super::tile::{self, ROWS};
+use super::tile::{self, ROWS, WIDE};
 use crate::kernels::zeros;
 
 /// Rows multiplied with one tile of the right factor before the next, a multiple of a tile's rows.
 const BLOCK: usize = 8 * ROWS;
-/// Vectors of a tile with 32 registers of 16 numbers, of which the sums fill 24; other machines have tiles of two vectors.
-const WIDE: usize = 4;
 /// Numbers of a row that are multiplied at a time: a tile takes at most 32 KiB.
 const DEPTH: usize = 128;
 /// Columns that one core multiplies or sums at a time.

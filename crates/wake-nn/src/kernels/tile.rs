@@ -8,6 +8,9 @@ pub(super) const ROWS: usize = 6;
 /// The sums of one tile, kept in registers.
 pub(super) type Sums<S> = [[<S as Simd>::f32s; 2]; ROWS];
 
+/// Vectors of a wide tile, whose sums fill 24 of 32 registers.
+pub(super) const WIDE: usize = 4;
+
 /// Columns of a tile: two vectors.
 pub(super) const fn width<S: Simd>() -> usize {
     2 * S::F32_LANES
@@ -61,7 +64,38 @@ pub(super) fn multiply<S: Simd, const V: usize>(
     *sums = held;
 }
 
-/// Adds the product of the transpose of six columns with a panel that is one tile wide.
+/// Adds the products of six rows with two panels, both one tile wide, as [`multiply`] does with each of them: the sums of both fill 24
+/// of 32 registers, and each number of a row is read once.
+#[inline(always)]
+pub(super) fn multiply_two<S: Simd>(
+    simd: S,
+    rows: [&[f32]; ROWS],
+    start: usize,
+    panels: [&[f32]; 2],
+    sums: [&mut Sums<S>; 2],
+) {
+    let [left, right] = panels.map(|panel| S::as_simd_f32s(panel).0.as_chunks::<2>().0);
+    let right = &right[..left.len()];
+    let [mut a, mut b, mut c, mut d, mut e, mut f] = rows;
+    for row in [&mut a, &mut b, &mut c, &mut d, &mut e, &mut f] {
+        *row = &row[start..start + left.len()];
+    }
+    let [first, second] = sums;
+    let (mut lefts, mut rights) = (*first, *second);
+    for (k, (left, right)) in left.iter().zip(right).enumerate() {
+        let values = [a[k], b[k], c[k], d[k], e[k], f[k]];
+        for ((ls, rs), value) in lefts.iter_mut().zip(&mut rights).zip(values) {
+            let value = simd.splat_f32s(value);
+            for n in 0..2 {
+                ls[n] = simd.mul_add_f32s(value, left[n], ls[n]);
+                rs[n] = simd.mul_add_f32s(value, right[n], rs[n]);
+            }
+        }
+    }
+    (*first, *second) = (lefts, rights);
+}
+
+/// Adds the product of the transpose of six columns with a panel that is V vectors wide.
 ///
 /// ```text
 /// sums[i][j] += Σ_k left[k][columns.start + i] · panel[k][j]
@@ -72,27 +106,28 @@ pub(super) fn multiply<S: Simd, const V: usize>(
 /// - `left`: rows `step` apart, `[k, columns.end]`; with fewer than six columns the other sums stay unchanged
 /// - `panel`: `[k, width]`
 #[inline(always)]
-pub(super) fn multiply_columns<S: Simd>(
+pub(super) fn multiply_columns<S: Simd, const V: usize>(
     simd: S,
     left: &[f32],
     step: usize,
     columns: std::ops::Range<usize>,
     panel: &[f32],
-    sums: &mut Sums<S>,
+    sums: &mut [[S::f32s; V]; ROWS],
 ) {
-    let (panel, _) = S::as_simd_f32s(panel).0.as_chunks::<2>();
+    let (panel, _) = S::as_simd_f32s(panel).0.as_chunks::<V>();
     let mut held = *sums;
-    for ([near, far], row) in panel.iter().zip(left.chunks(step)) {
+    for (panel, row) in panel.iter().zip(left.chunks(step)) {
         let row = &row[columns.clone()];
         let mut few = [0.0; ROWS];
         let values = row.first_chunk().unwrap_or_else(|| {
             few[..row.len()].copy_from_slice(row);
             &few
         });
-        for (sum, &value) in held.iter_mut().zip(values) {
+        for (sums, &value) in held.iter_mut().zip(values) {
             let value = simd.splat_f32s(value);
-            sum[0] = simd.mul_add_f32s(value, *near, sum[0]);
-            sum[1] = simd.mul_add_f32s(value, *far, sum[1]);
+            for (sum, panel) in sums.iter_mut().zip(panel) {
+                *sum = simd.mul_add_f32s(value, *panel, *sum);
+            }
         }
     }
     *sums = held;

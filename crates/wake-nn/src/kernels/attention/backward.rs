@@ -5,9 +5,9 @@ use rayon::prelude::*;
 
 use super::super::product::{Rows, Target, multiply};
 use super::super::silu::exp;
-use super::super::tile;
+use super::super::tile::{self, WIDE};
 use super::Shape;
-use super::forward::{Softmax, TOKENS, add_values, products};
+use super::forward::{Softmax, TOKENS, add_values, fills_wide, products};
 use crate::kernels::zeros;
 
 /// Queries whose weights are held at a time: as many as tokens in the forward pass.
@@ -93,7 +93,18 @@ impl WithSimd for Backward<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> [Vec<f32>; 3] {
-        let (width, depth) = (tile::width::<S>(), self.shape.depth());
+        match S::REGISTER_COUNT {
+            32.. if fills_wide::<S>(self.shape.tokens[1]) => self.run::<S, WIDE>(simd),
+            _ => self.run::<S, 2>(simd),
+        }
+    }
+}
+
+impl Backward<'_> {
+    /// Computes the gradients with tiles of V vectors.
+    #[inline(always)]
+    fn run<S: Simd, const V: usize>(self, simd: S) -> [Vec<f32>; 3] {
+        let (width, depth) = (V * S::F32_LANES, self.shape.depth());
         let scale = self.shape.scale();
         let [asking, seen] = self.shape.tokens;
         let mut out = [asking, seen, seen].map(|tokens| vec![0.0; tokens * depth]);
@@ -111,7 +122,7 @@ impl WithSimd for Backward<'_> {
             let [key, value] = [self.key, self.value].map(|rows| rows.from(token, width));
             let keys = key.pack_transposed(depth, width);
             let values = value.pack_transposed(depth, width);
-            let right = key.pack(depth, width);
+            let right = key.pack(depth, tile::width::<S>());
             let [mut of_key, mut of_value] = [0; 2].map(|_| vec![0.0; depth * width]);
             // Queries before a token do not attend to it.
             let begin = if self.shape.causal { token } else { 0 };
@@ -121,14 +132,14 @@ impl WithSimd for Backward<'_> {
                     [self.query, self.gradient].map(|rows| rows.from(first, count));
                 let weights = &mut weights[..count * width];
                 let slopes = &mut slopes[..count * width];
-                products::<S>(simd, &query, &keys, weights);
+                products::<S, V>(simd, &query, &keys, weights);
                 if self.shape.causal {
                     for (i, row) in weights.chunks_exact_mut(width).enumerate() {
                         let visible = (first + i + 1 - token).min(width);
                         row[visible..].fill(f32::NEG_INFINITY);
                     }
                 }
-                products::<S>(simd, &gradient, &values, slopes);
+                products::<S, V>(simd, &gradient, &values, slopes);
                 let rows = weights
                     .chunks_exact_mut(width)
                     .zip(slopes.chunks_exact_mut(width));
@@ -140,8 +151,8 @@ impl WithSimd for Backward<'_> {
                         *slope = scale * *weight * (*slope - mean);
                     }
                 }
-                add_values::<S>(simd, &gradient, weights, depth, &mut of_value);
-                add_values::<S>(simd, &query, slopes, depth, &mut of_key);
+                add_values::<S, V>(simd, &gradient, weights, depth, &mut of_value);
+                add_values::<S, V>(simd, &query, slopes, depth, &mut of_key);
                 let left = Rows {
                     values: slopes,
                     step: width,

@@ -5,12 +5,12 @@ use rayon::prelude::*;
 
 use super::super::product::Rows;
 use super::super::silu::exp;
-use super::super::tile::{self, ROWS};
+use super::super::tile::{self, ROWS, WIDE};
 use super::Shape;
 use crate::kernels::zeros;
 
-/// Tokens whose scores are held at a time, a multiple of a tile's rows: the scores of 32 queries take 24 KiB of a core's
-/// L1 cache.
+/// Tokens whose scores are held at a time, a multiple of a tile's rows: the scores of 32 queries take 24 KiB, those of 64
+/// queries 48 KiB.
 pub(super) const TOKENS: usize = 32 * ROWS;
 
 /// Computes attention; see [`attention`](crate::attention::attention).
@@ -33,8 +33,41 @@ pub(crate) fn attend(
     value: &[f32],
     shape: &Shape,
 ) -> (Vec<f32>, Vec<Softmax>) {
+    let vectors = Arch::new().dispatch(Vectors(shape));
+    blocks([query, key, value], shape, vectors)
+}
+
+/// Number of vectors of queries in a tile: a wide one, unless places would stay empty or cores idle.
+struct Vectors<'a>(&'a Shape);
+
+impl WithSimd for Vectors<'_> {
+    type Output = usize;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> usize {
+        let asking = self.0.tokens[0];
+        let tasks = self.0.batch * asking.div_ceil(WIDE * S::F32_LANES);
+        match S::REGISTER_COUNT {
+            32.. if fills_wide::<S>(asking) && tasks >= 2 * rayon::current_num_threads() => WIDE,
+            _ => 2,
+        }
+    }
+}
+
+/// Whether wide tiles have no more empty places than tiles of two vectors have.
+pub(super) fn fills_wide<S: Simd>(tokens: usize) -> bool {
+    let [few, many] = [2, WIDE].map(|vectors| tokens.next_multiple_of(vectors * S::F32_LANES));
+    few == many
+}
+
+/// Attention in blocks of as many queries as `vectors` hold.
+fn blocks(
+    [query, key, value]: [&[f32]; 3],
+    shape: &Shape,
+    vectors: usize,
+) -> (Vec<f32>, Vec<Softmax>) {
     let arch = Arch::new();
-    let block = arch.dispatch(tile::Width);
+    let block = arch.dispatch(tile::Width) / 2 * vectors;
     let [asking, seen] = shape.tokens;
     let mut out = zeros(query.len());
     let mut softmaxes = vec![Softmax::default(); shape.batch * asking * shape.heads];
@@ -54,6 +87,7 @@ pub(crate) fn attend(
                             value: shape.head(value, seen, n, head),
                             first: i * block,
                             shape,
+                            vectors,
                             out: &mut out[head * shape.depth()..],
                         });
                     }
@@ -80,6 +114,8 @@ struct Forward<'a> {
     /// Position of the first query in its sequence.
     first: usize,
     shape: &'a Shape,
+    /// Vectors of queries.
+    vectors: usize,
     out: &'a mut [f32],
 }
 
@@ -88,7 +124,18 @@ impl WithSimd for Forward<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let (width, depth) = (tile::width::<S>(), self.shape.depth());
+        match self.vectors {
+            WIDE => self.run::<S, WIDE>(simd),
+            _ => self.run::<S, 2>(simd),
+        }
+    }
+}
+
+impl Forward<'_> {
+    /// Attends with tiles of V vectors.
+    #[inline(always)]
+    fn run<S: Simd, const V: usize>(self, simd: S) {
+        let (width, depth) = (V * S::F32_LANES, self.shape.depth());
         let query = self.query.pack_transposed(depth, width);
         let mut scores = vec![0.0; TOKENS.min(self.key.count) * width];
         // For each query: the weighted sum of values, the largest score and the sum of exponentials.
@@ -103,17 +150,17 @@ impl WithSimd for Forward<'_> {
         for first in (0..seen).step_by(TOKENS) {
             let count = TOKENS.min(seen - first);
             let scores = &mut scores[..count * width];
-            products::<S>(simd, &self.key.from(first, count), &query, scores);
+            products::<S, V>(simd, &self.key.from(first, count), &query, scores);
             if self.shape.causal {
                 hide(scores, width, first, self.first);
             }
-            let shrunk = exponentials::<S>(scores, &mut largest, &mut totals, self.shape.scale());
+            let shrunk = exponentials(scores, &mut largest, &mut totals, self.shape.scale());
             for sums in sums.chunks_exact_mut(width) {
                 for (sum, shrunk) in sums.iter_mut().zip(&shrunk) {
                     *sum *= shrunk;
                 }
             }
-            add_values::<S>(
+            add_values::<S, V>(
                 simd,
                 &self.value.from(first, count),
                 scores,
@@ -138,15 +185,20 @@ impl WithSimd for Forward<'_> {
 
 /// `scores[k][j] = Σ_d key[k][d] · query[d][j]`
 #[inline(always)]
-pub(super) fn products<S: Simd>(simd: S, key: &Rows<'_>, query: &[f32], scores: &mut [f32]) {
-    let width = tile::width::<S>();
+pub(super) fn products<S: Simd, const V: usize>(
+    simd: S,
+    key: &Rows<'_>,
+    query: &[f32],
+    scores: &mut [f32],
+) {
+    let width = V * S::F32_LANES;
     let depth = query.len() / width;
     for (tile, scores) in scores.chunks_mut(ROWS * width).enumerate() {
         let mut rows = [key.values; ROWS];
         for (i, row) in rows.iter_mut().enumerate() {
             *row = key.get(tile * ROWS + i, depth);
         }
-        let mut sums = tile::start(simd, [0.0; ROWS]);
+        let mut sums = [[simd.splat_f32s(0.0); V]; ROWS];
         tile::multiply(simd, rows, 0, query, &mut sums);
         for (sum, scores) in sums.into_iter().zip(scores.chunks_exact_mut(width)) {
             tile::store::<S, _>(sum, scores);
@@ -165,13 +217,13 @@ fn hide(scores: &mut [f32], width: usize, first_token: usize, first_query: usize
 /// Replaces each x by `e^(s (x − m))`, where m is the largest score of its query so far, and returns the factors by which
 /// the earlier sums of each query must be multiplied.
 #[inline(always)]
-fn exponentials<S: Simd>(
+fn exponentials(
     scores: &mut [f32],
     largest: &mut [f32],
     totals: &mut [f32],
     scale: f32,
 ) -> Vec<f32> {
-    let width = tile::width::<S>();
+    let width = largest.len();
     let mut shrunk = largest.to_vec();
     for row in scores.chunks_exact(width) {
         for (max, &x) in largest.iter_mut().zip(row) {
@@ -200,18 +252,18 @@ fn exponentials<S: Simd>(
 
 /// `sums[d][j] += Σ_k value[k][d] · weights[k][j]`
 #[inline(always)]
-pub(super) fn add_values<S: Simd>(
+pub(super) fn add_values<S: Simd, const V: usize>(
     simd: S,
     value: &Rows<'_>,
     weights: &[f32],
     depth: usize,
     sums: &mut [f32],
 ) {
-    let width = tile::width::<S>();
+    let width = V * S::F32_LANES;
     for first in (0..depth).step_by(ROWS) {
         // The last tile starts earlier where possible, and only its new rows are kept.
         let from = first.min(depth.saturating_sub(ROWS));
-        let mut tile = tile::start(simd, [0.0; ROWS]);
+        let mut tile = [[simd.splat_f32s(0.0); V]; ROWS];
         tile::multiply_columns(
             simd,
             value.values,
@@ -222,9 +274,32 @@ pub(super) fn add_values<S: Simd>(
         );
         let rows = sums[first * width..].chunks_exact_mut(width);
         for (tile, sums) in tile.into_iter().skip(first - from).zip(rows) {
-            let before: [_; 2] = tile::load(simd, sums);
-            let sum = [0, 1].map(|half| simd.add_f32s(before[half], tile[half]));
-            tile::store::<S, _>(sum, sums);
+            let before: [_; V] = tile::load(simd, sums);
+            let sum = std::array::from_fn(|n| simd.add_f32s(before[n], tile[n]));
+            tile::store::<S, V>(sum, sums);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernels::noise;
+
+    /// Wide tiles give the same bits, for whole blocks of queries and for a part of one.
+    #[test]
+    fn wide_tiles_change_nothing() {
+        for tokens in [[128, 77], [70, 200], [5, 5]] {
+            let shape = Shape {
+                batch: 2,
+                heads: 2,
+                channels: 22,
+                tokens,
+                causal: tokens[0] == tokens[1],
+            };
+            let [query, context] = tokens.map(|count| noise(2 * count * 22, 7));
+            let of = |vectors| blocks([&query, &context, &context], &shape, vectors).0;
+            assert!(of(WIDE) == of(2), "{tokens:?}");
         }
     }
 }

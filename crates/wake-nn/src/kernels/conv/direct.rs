@@ -1,5 +1,7 @@
 //! Convolution by its defining sum, for any kernel and stride.
 
+use std::ops::Range;
+
 use pulp::{Simd, WithSimd};
 
 use crate::kernels::arch::arch;
@@ -8,14 +10,14 @@ use rayon::prelude::*;
 use super::geometry::Geometry;
 use super::layout::{Gather, Layout};
 use crate::kernels::columns::columns;
-use crate::kernels::tile::{self, ROWS};
+use crate::kernels::tile::{self, ROWS, Sums};
 use crate::kernels::zeros;
 
-/// Rows of a panel of patches that are multiplied at once: 16 columns of them take 32 KiB.
-const DEPTH: usize = 512;
+/// Rows of a panel of patches that are multiplied at once: 32 columns of them take 16 KiB, two panels 32 KiB of a core's L1 cache.
+const DEPTH: usize = 1024;
 
 /// Largest number of panels that share one pass over the weights.
-const PANELS: usize = 8;
+const PANELS: usize = 6;
 
 /// Convolves a batch of images, with the shapes of [`convolve`](super::convolve).
 pub(super) fn convolve(
@@ -129,6 +131,10 @@ impl Block<'_> {
     #[inline(always)]
     fn multiply<S: Simd>(&mut self, simd: S, start: usize, patches: &[f32], depth: usize) {
         let width = tile::width::<S>();
+        let together = match S::REGISTER_COUNT {
+            32.. => 2,
+            _ => 1,
+        };
         let patch = self.geometry.patch();
         let last = self.y.len() - 1;
         for (i, y) in self.y.chunks_mut(ROWS).enumerate() {
@@ -139,19 +145,35 @@ impl Block<'_> {
                 *weights = &self.weight[row * patch + start..][..depth];
                 *bias = self.bias.map_or(0.0, |bias| bias[row]);
             }
-            for (panel, patches) in patches.chunks_exact(depth * width).enumerate() {
+            let begin = |y: &[&mut [f32]], part: &Range<usize>| {
                 let mut sums = tile::start(simd, bias);
-                let part = |y: &[f32]| panel * width..y.len().min((panel + 1) * width);
                 if start > 0 {
-                    for (sum, y) in sums.iter_mut().zip(&*y) {
-                        *sum = tile::load(simd, &y[part(y)]);
+                    for (sum, y) in sums.iter_mut().zip(y) {
+                        *sum = tile::load(simd, &y[part.clone()]);
                     }
                 }
-                tile::multiply(simd, weights, 0, patches, &mut sums);
-                for (sum, y) in sums.into_iter().zip(&mut *y) {
-                    let part = part(y);
-                    tile::store::<S, _>(sum, &mut y[part]);
+                sums
+            };
+            let end = |sums: Sums<S>, y: &mut [&mut [f32]], part: &Range<usize>| {
+                for (sum, y) in sums.into_iter().zip(y) {
+                    tile::store::<S, _>(sum, &mut y[part.clone()]);
                 }
+            };
+            let pixels = y[0].len();
+            for (n, patches) in patches.chunks(together * depth * width).enumerate() {
+                let first = n * together * width;
+                let [near, far] = [first, first + width].map(|at| at..pixels.min(at + width));
+                let (panel, other) = patches.split_at(depth * width);
+                let mut sums = begin(y, &near);
+                if other.is_empty() {
+                    tile::multiply(simd, weights, 0, panel, &mut sums);
+                } else {
+                    let mut others = begin(y, &far);
+                    let both = [&mut sums, &mut others];
+                    tile::multiply_two(simd, weights, 0, [panel, other], both);
+                    end(others, y, &far);
+                }
+                end(sums, y, &near);
             }
         }
     }

@@ -10,7 +10,7 @@ use crate::kernels::columns::columns;
 use crate::kernels::conv::direct::by_blocks;
 use crate::kernels::conv::geometry::Geometry;
 use crate::kernels::conv::layout::{Gather, Layout};
-use crate::kernels::tile::{self, ROWS};
+use crate::kernels::tile::{self, ROWS, Sums};
 use crate::kernels::zeros;
 
 /// Numbers of the transformed image that a task keeps in a core's L2 cache: 512 KiB.
@@ -155,7 +155,7 @@ impl WithSimd for Block<'_> {
         let panels = windows.div_ceil(width);
         let panel = PLACES * channels * width;
         // A row of tiles of a wide image exceeds the cache: transform some panels of it at a time.
-        let together = (NEAR / panel).clamp(1, panels);
+        let together = (NEAR / panel).clamp(2.min(panels), panels);
         let mut image = vec![0.0; together * panel];
         let mut window = vec![0.0; PLACES * width];
         for first in (0..panels).step_by(together) {
@@ -216,20 +216,36 @@ impl Block<'_> {
         let mut products = vec![0.0; image.len() / panel * ROWS * PLACES * width];
         for row in (0..channels_out).step_by(ROWS) {
             for place in 0..PLACES {
-                let mut weights = [&self.weight[..0]; ROWS];
-                for (r, weights) in weights.iter_mut().enumerate() {
+                let weights = std::array::from_fn(|r| {
                     let row = place * channels_out + (row + r).min(channels_out - 1);
-                    *weights = &self.weight[row * channels..][..channels];
-                }
-                let products = products.chunks_exact_mut(ROWS * PLACES * width);
-                for (image, products) in image.chunks_exact(panel).zip(products) {
-                    let image = &image[place * channels * width..][..channels * width];
-                    let mut sums = tile::start(simd, [0.0; ROWS]);
-                    tile::multiply(simd, weights, 0, image, &mut sums);
+                    &self.weight[row * channels..][..channels]
+                });
+                let store = |sums: Sums<S>, products: &mut [f32]| {
                     let rows = products.chunks_exact_mut(PLACES * width);
                     for (sum, row) in sums.into_iter().zip(rows) {
                         tile::store::<S, _>(sum, &mut row[place * width..][..width]);
                     }
+                };
+                let at_place = place * channels * width..(place + 1) * channels * width;
+                let panels = image
+                    .chunks_exact(panel)
+                    .map(|panel| &panel[at_place.clone()]);
+                let mut both = panels.zip(products.chunks_exact_mut(ROWS * PLACES * width));
+                while let Some((panel, product)) = both.next() {
+                    let mut sums = tile::start(simd, [0.0; ROWS]);
+                    let next = match S::REGISTER_COUNT {
+                        32.. => both.next(),
+                        _ => None,
+                    };
+                    if let Some((next, product)) = next {
+                        let mut others = sums;
+                        let both = [&mut sums, &mut others];
+                        tile::multiply_two(simd, weights, 0, [panel, next], both);
+                        store(others, product);
+                    } else {
+                        tile::multiply(simd, weights, 0, panel, &mut sums);
+                    }
+                    store(sums, product);
                 }
             }
             for (i, products) in products.chunks_exact(ROWS * PLACES * width).enumerate() {
