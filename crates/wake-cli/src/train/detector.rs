@@ -27,7 +27,7 @@ pub(crate) struct Options {
     /// Recipe of the training images, with --labelled of every other one [default: mixed, with --labelled none]
     #[arg(long, value_parser = named::recipe())]
     recipe: Option<ImageRecipe>,
-    /// Number of different images of the recipe, which repeat in turn [default: no image repeats]
+    /// Number of different images of the recipe, which repeat in turn; in mixed and full only of simulated images, painted ones are new [default: no image repeats]
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(16..=1_000_000))]
     distinct: Option<u32>,
     /// Folder of a data set of `wake dataset` with images of 256 x 256 pixels, instead of a recipe

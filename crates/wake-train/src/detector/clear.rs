@@ -24,11 +24,6 @@ impl Clear {
         Self { simulated }
     }
 
-    /// Seed of the scenes.
-    pub(crate) fn seed(&self) -> u64 {
-        self.simulated.seed()
-    }
-
     /// Whether a scene shows a clear wake, by its labels, which need no simulated image.
     fn is_clear(&self, index: u64) -> wake_dataset::Result<bool> {
         let scene = self.simulated.scene(index)?;

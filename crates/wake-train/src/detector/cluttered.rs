@@ -2,13 +2,13 @@
 //! fronts, filaments, borders.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 use wake_dataset::{Grey, Pair, Source};
 use wake_physics::labels::WakeLabel;
 use wake_physics::measure::median;
 
-use super::clear::Clear;
 use super::draw::Draw;
 use super::sea::{Echoes, border, clutter, filaments, front};
 
@@ -21,20 +21,21 @@ const HIDES: f32 = 0.5;
 /// Random numbers of the clutter, apart from those of other draws of the same seed.
 const STREAM: u64 = 0xC1_77E5;
 
-/// Simulated images under painted clutter.
+/// Simulated images under painted clutter, which is another at every position, also where an image repeats.
 #[derive(Debug)]
 pub(crate) struct Cluttered {
-    clear: Clear,
+    simulated: Arc<dyn Source>,
+    seed: u64,
 }
 
 impl Cluttered {
-    pub(crate) fn new(clear: Clear) -> Self {
-        Self { clear }
+    pub(crate) fn new(simulated: Arc<dyn Source>, seed: u64) -> Self {
+        Self { simulated, seed }
     }
 
-    /// Paints clutter over an image.
-    fn painted_over(&self, mut pair: Pair) -> Pair {
-        let draw = &mut Draw::new(self.clear.seed() ^ STREAM, pair.index);
+    /// Paints the clutter of a position over an image.
+    fn painted_over(&self, mut pair: Pair, position: u64) -> Pair {
+        let draw = &mut Draw::new(self.seed ^ STREAM, position);
         let size = pair.image.rows;
         let mut mean = vec![1.0; size * size];
         if draw.chance(FRONTS) {
@@ -81,19 +82,22 @@ fn hide(wake: &mut WakeLabel, size: usize, hidden: impl Fn(usize) -> bool) {
 
 impl Source for Cluttered {
     fn size(&self) -> [usize; 2] {
-        self.clear.size()
+        self.simulated.size()
     }
 
     fn items(&self, positions: Range<u64>) -> wake_dataset::Result<Vec<Pair>> {
-        let pairs = self.clear.items(positions)?;
-        let painted = pairs.into_par_iter().map(|pair| self.painted_over(pair));
-        Ok(painted.collect())
+        let pairs = self.simulated.items(positions.clone())?;
+        let places: Vec<(Pair, u64)> = pairs.into_iter().zip(positions).collect();
+        let over = |(pair, position)| self.painted_over(pair, position);
+        Ok(places.into_par_iter().map(over).collect())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::detector::Repeated;
+    use crate::detector::clear::Clear;
     use wake_dataset::{Recipe, Simulated};
     use wake_physics::labels::Visibility;
 
@@ -101,7 +105,7 @@ mod tests {
         let changes = ["scene.grid.rows = 96", "scene.grid.columns = 96"];
         let recipe = Recipe::detector().and_then(|recipe| recipe.with_assignments(&changes));
         let simulated = Simulated::new(recipe.expect("a recipe"), 5).expect("a source");
-        Cluttered::new(Clear::new(simulated))
+        Cluttered::new(Arc::new(Clear::new(simulated)), 5)
     }
 
     /// Images depend on their positions alone; where nothing is painted the simulated grey stays.
@@ -111,7 +115,7 @@ mod tests {
         let pairs = source.items(0..6).expect("pairs");
         assert_eq!(source.items(4..6).expect("pairs"), pairs[4..]);
         let mut kept = 0;
-        let simulated = source.clear.items(0..6).expect("pairs");
+        let simulated = source.simulated.items(0..6).expect("pairs");
         for (pair, below) in pairs.iter().zip(&simulated) {
             let same = |(a, b): (&f32, &f32)| (a - b).abs() < 0.5 / 255.0;
             let pixels = pair.image.pixels.iter().zip(&below.image.pixels);
@@ -119,6 +123,19 @@ mod tests {
         }
         let all = 6 * 96 * 96;
         assert!(kept > all / 4 && kept < all, "{kept} of {all}");
+    }
+
+    /// An image that repeats lies under other clutter, with the same wakes.
+    #[test]
+    fn repeated_images_have_new_clutter() {
+        let repeated = Repeated::new(source().simulated, 2);
+        let pairs = Cluttered::new(Arc::new(repeated), 5)
+            .items(0..4)
+            .expect("pairs");
+        for (first, again) in pairs[..2].iter().zip(&pairs[2..]) {
+            assert_eq!(first.scene, again.scene);
+            assert!(first.image != again.image);
+        }
     }
 
     /// A wake with three quarters of its line under land keeps half its signal-to-noise ratio, a free wake all of it.

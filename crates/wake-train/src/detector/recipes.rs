@@ -9,6 +9,7 @@ use wake_ldm::{Sampled, WakeSampler};
 use super::clear::Clear;
 use super::cluttered::Cluttered;
 use super::painted::Painted;
+use super::repeated::Repeated;
 
 /// Images of a training or an evaluation of the detector.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -132,43 +133,61 @@ impl ImageRecipe {
         size: usize,
         device: &Device,
     ) -> wake_dataset::Result<Arc<dyn Source>> {
+        self.repeated(seed, size, device, None)
+    }
+
+    /// As [`Self::source`], of which `distinct` images are made and repeat in turn; `None`: no image repeats.
+    ///
+    /// In mixtures only simulated images repeat, since they take long: painted ones, and clutter over simulated ones, are new.
+    pub(super) fn repeated(
+        self,
+        seed: u64,
+        size: usize,
+        device: &Device,
+        distinct: Option<usize>,
+    ) -> wake_dataset::Result<Arc<dyn Source>> {
+        let kept = |source: Arc<dyn Source>, share: usize| -> Arc<dyn Source> {
+            match distinct {
+                Some(count) => Arc::new(Repeated::new(source, count.div_ceil(share))),
+                None => source,
+            }
+        };
+        let cluttered = |recipe: Recipe, share: usize, clutter: u64| {
+            let clear = kept(Arc::new(clear(recipe, seed, size)?), share);
+            let source: Arc<dyn Source> = Arc::new(Cluttered::new(clear, clutter));
+            Ok(source)
+        };
+        let painted: Arc<dyn Source> = Arc::new(Painted { seed, size });
         let changes: [&[&str]; 3] = match self {
             Self::Plain => [&CALM, &NO_EDGE, &PLAIN],
             Self::Echo => [&CALM, &NO_EDGE, &[]],
             Self::Edge => [&CALM, &[], &[]],
             Self::Satellites => [&[]; 3],
             Self::Detector => {
-                return Ok(Arc::new(simulated(Recipe::detector()?, &[], seed, size)?));
+                let detector = simulated(Recipe::detector()?, &[], seed, size)?;
+                return Ok(kept(Arc::new(detector), 1));
             }
-            Self::Cluttered => {
-                return Ok(Arc::new(Cluttered::new(clear(
-                    Recipe::detector()?,
-                    seed,
-                    size,
-                )?)));
-            }
-            Self::Clear => return Ok(Arc::new(clear(Recipe::detector()?, seed, size)?)),
-            Self::Painted => return Ok(Arc::new(Painted { seed, size })),
+            Self::Clear => return Ok(kept(Arc::new(clear(Recipe::detector()?, seed, size)?), 1)),
+            Self::Cluttered => return cluttered(Recipe::detector()?, 1, seed),
+            Self::Painted => return Ok(kept(painted, 1)),
             Self::Sampled => {
                 let sampler = WakeSampler::pretrained(device)?;
                 let scenes = simulated(Recipe::satellites()?, &[], seed, size)?;
-                return Ok(Arc::new(Sampled::new(sampler, scenes)?));
+                return Ok(kept(Arc::new(Sampled::new(sampler, scenes)?), 1));
             }
             Self::Mixed => {
-                let parts = [Self::Painted, Self::Detector];
-                return in_turn(parts.map(|part| part.source(seed, size, device)));
+                let detector = Self::Detector.repeated(seed, size, device, distinct);
+                return in_turn([Ok(painted), detector]);
             }
             Self::Full => {
-                let satellites = Cluttered::new(clear(Recipe::satellites()?, seed, size)?);
-                return in_turn([
-                    Self::Painted.source(seed, size, device),
-                    Self::Cluttered.source(seed, size, device),
-                    Ok(Arc::new(satellites)),
-                ]);
+                let detector = cluttered(Recipe::detector()?, 2, seed);
+                let satellites = cluttered(Recipe::satellites()?, 2, !seed);
+                return in_turn([Ok(painted), detector, satellites]);
             }
         };
         let recipe = Recipe::satellites()?;
-        Ok(Arc::new(simulated(recipe, &changes.concat(), seed, size)?))
+        let source = simulated(recipe, &changes.concat(), seed, size)?;
+        Ok(kept(Arc::new(source), 1))
     }
 
     /// Images of the open sea of the recipe satellites, or of the recipe plain: without ships and slicks.

@@ -15,7 +15,6 @@ use super::data::TrainingData;
 use super::draw::Draw;
 use super::labelled::{self, LabelledImages};
 use super::recipes::{ImageRecipe, in_turn};
-use super::repeated::Repeated;
 use super::sample::Sample;
 use super::targets::{Batch, Prepared};
 use crate::error::Result;
@@ -116,7 +115,8 @@ impl Task<Network> for DetectorTask {
 pub struct MadeImages {
     /// Recipe of the images.
     pub recipe: ImageRecipe,
-    /// Number of different images, repeated endlessly; `None`: all are different.
+    /// Number of different images, repeated endlessly; `None`: all are different. In the recipes mixed and full it counts
+    /// simulated images, and painted ones do not repeat. Clutter over repeated images is new.
     pub distinct: Option<usize>,
 }
 
@@ -220,11 +220,7 @@ impl MadeImages {
     /// Source of the pairs, and their identity for the record of a run.
     fn source(&self, options: &StageOptions) -> Result<(Arc<dyn Source>, Value)> {
         let Self { recipe, distinct } = self;
-        let source = recipe.source(options.seed, SIZE, &options.device())?;
-        let source: Arc<dyn Source> = match distinct {
-            Some(count) => Arc::new(Repeated::new(source, *count)),
-            None => source,
-        };
+        let source = recipe.repeated(options.seed, SIZE, &options.device(), *distinct)?;
         let noted = json!({"recipe": recipe.name(), "distinct": distinct});
         Ok((source, noted))
     }

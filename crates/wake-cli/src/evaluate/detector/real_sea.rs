@@ -57,21 +57,22 @@ fn simulated(source: &Arc<dyn Source>, count: usize) -> Outcome<Vec<Field>> {
 /// floor.
 pub(crate) fn told_apart(real: &[Field]) -> Outcome<Vec<Value>> {
     let device = device_named("flex")?;
-    let sea = |plain: bool, seed: u64| -> Outcome<Vec<Field>> {
-        simulated(&ImageRecipe::open_sea(plain, seed, WINDOW)?, real.len())
-    };
-    let detector = sea(false, HELD_OUT)?;
+    let windows = |source: wake_dataset::Result<Arc<dyn Source>>| simulated(&source?, real.len());
+    let satellites = |plain: bool| windows(ImageRecipe::open_sea(plain, HELD_OUT, WINDOW));
+    let detector = |seed: u64| windows(ImageRecipe::empty_sea(seed, WINDOW));
+    let delivered = detector(HELD_OUT)?;
     let rows = [
         (
             "real sea and pixels without response",
             real,
-            sea(true, HELD_OUT)?,
+            satellites(true)?,
         ),
-        ("real sea and recipe detector", real, detector.clone()),
+        ("real sea and recipe satellites", real, satellites(false)?),
+        ("real sea and recipe detector", real, delivered.clone()),
         (
             "recipe detector and itself, other seeds",
-            &detector,
-            sea(false, HELD_OUT + 1)?,
+            &delivered,
+            detector(HELD_OUT + 1)?,
         ),
     ];
     let row = |(name, first, second): (&str, &[Field], Vec<Field>)| {

@@ -117,7 +117,7 @@ impl WithSimd for Block<'_> {
 impl Block<'_> {
     /// Writes the patches of one tile's pixels: a row of pixels for every channel and tap.
     #[inline(always)]
-    fn pack<S: Simd>(&self, channels: std::ops::Range<usize>, first: usize, panel: &mut [f32]) {
+    fn pack<S: Simd>(&self, channels: Range<usize>, first: usize, panel: &mut [f32]) {
         let gather = Gather::new::<S>(&self.layout, self.geometry, self.first + first);
         let plane = self.layout.plane();
         let planes = self.planes.chunks_exact(plane).skip(channels.start);
