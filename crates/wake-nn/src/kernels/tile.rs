@@ -208,4 +208,32 @@ mod tests {
             }
         }
     }
+    struct Two<'a>(&'a [f32], &'a [f32]);
+
+    impl WithSimd for Two<'_> {
+        type Output = bool;
+
+        fn with_simd<S: Simd>(self, simd: S) -> bool {
+            let rows = std::array::from_fn(|i| &self.0[i * 10..(i + 1) * 10]);
+            let panels = [0, 9].map(|from| &self.1[from * width::<S>()..][..9 * width::<S>()]);
+            let bits =
+                |sums: Sums<S>| -> Vec<u32> { bytemuck::cast_slice(sums.as_flattened()).to_vec() };
+            let alone = panels.map(|panel| {
+                let mut sums = start(simd, [0.5; ROWS]);
+                multiply(simd, rows, 1, panel, &mut sums);
+                bits(sums)
+            });
+            let [mut left, mut right] = [start(simd, [0.5; ROWS]); 2];
+            multiply_two(simd, rows, 1, panels, [&mut left, &mut right]);
+            [left, right].map(bits) == alone
+        }
+    }
+
+    /// Two panels at once give the same bits as one after the other.
+    #[test]
+    fn two_panels_are_multiplied_as_each_alone() {
+        let (rows, panels) = (noise(ROWS * 10, 1), noise(18 * 64, 2));
+        assert!(pulp::Scalar::new().vectorize(Two(&rows, &panels)));
+        assert!(pulp::Arch::new().dispatch(Two(&rows, &panels)));
+    }
 }
