@@ -16,10 +16,12 @@ use crate::kernels::zeros;
 
 /// Rows multiplied with one tile of the right factor before the next, a multiple of a tile's rows.
 const BLOCK: usize = 8 * ROWS;
-/// Numbers of a row that are multiplied at a time: a tile takes at most 32 KiB.
-const DEPTH: usize = 128;
-/// Columns that one core multiplies or sums at a time.
-const COLUMNS: usize = 128;
+/// Numbers of a row that are multiplied at a time, and columns that one core multiplies: together 480 KiB of its L2 cache. With fewer
+/// numbers, sums are read and written more often than their latency is hidden.
+const DEPTH: usize = 320;
+const COLUMNS: usize = 384;
+/// Columns that one core sums at a time.
+const SUMMED: usize = 128;
 
 /// Sizes of a layer: rows, input channels and output channels.
 #[derive(Debug, Clone, Copy)]
@@ -59,11 +61,11 @@ pub(crate) fn to_weight(x: &[f32], gradient: &[f32], sizes: Sizes) -> Vec<f32> {
 /// Gradient with respect to b: the sum over all rows, `[to]`.
 pub(crate) fn to_bias(gradient: &[f32], to: usize) -> Vec<f32> {
     let mut sums = vec![0.0; to];
-    sums.par_chunks_mut(COLUMNS)
+    sums.par_chunks_mut(SUMMED)
         .enumerate()
         .for_each(|(n, sums)| {
             for row in gradient.chunks_exact(to) {
-                for (sum, value) in sums.iter_mut().zip(&row[n * COLUMNS..]) {
+                for (sum, value) in sums.iter_mut().zip(&row[n * SUMMED..]) {
                     *sum += value;
                 }
             }
@@ -257,6 +259,7 @@ mod tests {
             (5, 7, 33),
             (50, 200, 70),
             (97, 385, 64),
+            (20, 700, 800),
             (500, 20, 150),
         ] {
             let sizes = Sizes { rows, from, to };
