@@ -306,36 +306,6 @@ fn assert_within(what: &str, ours: &[f32], exact: &[[f64; 2]], added: &[f32], bo
     }
 }
 
-/// Large images, whose gradients take two tiles of output channels at a time, give the same bits as the channels alone.
-#[test]
-fn two_tiles_of_channels_are_each_alone() {
-    let g = Geometry {
-        batch: 2,
-        channels: [260, 40],
-        size: [32, 32],
-        kernel: 3,
-        stride: 1,
-        border: [1; 4],
-    };
-    let (pixels, patch) = (g.size[0] * g.size[1], g.patch());
-    let x = noise(g.batch * g.channels[0] * pixels, 1);
-    let dy = noise(g.batch * g.channels[1] * pixels, 2);
-    let together = weights::weight_gradient(&x, &dy, &g);
-    for channels in [0..16, 16..32, 32..40] {
-        let alone = Geometry {
-            channels: [g.channels[0], channels.len()],
-            ..g
-        };
-        let images = dy.chunks_exact(g.channels[1] * pixels);
-        let part: Vec<f32> = images
-            .flat_map(|dy| &dy[channels.start * pixels..channels.end * pixels])
-            .copied()
-            .collect();
-        let alone = weights::weight_gradient(&x, &part, &alone);
-        assert!(alone == together[channels.start * patch..channels.end * patch]);
-    }
-}
-
 #[test]
 fn bias_is_added_to_every_pixel_and_its_gradient_is_their_sum() {
     let g = Geometry {

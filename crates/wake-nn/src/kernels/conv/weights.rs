@@ -126,10 +126,7 @@ fn transpose(matrix: &[f32], columns: usize) -> Vec<f32> {
 /// Numbers of the output's gradient that should stay in a core's L2 cache: 192 KiB.
 const NEAR: usize = 48 * 1024;
 
-/// Numbers of an image beyond a core's L2 cache, 1 MiB: two tiles of output channels read it once.
-const FAR: usize = 256 * 1024;
-
-/// Some images, and the gradient of their output channels, tile by tile.
+/// Some images, and the gradient of one tile of their output channels.
 struct Images<'a> {
     planes: &'a [f32],
     dy: &'a [f32],
@@ -164,48 +161,38 @@ impl WithSimd for Share<'_> {
         let group = (NEAR / panel).clamp(1, self.geometry.batch);
         let planes = self.planes.chunks(group * image[0]);
         for (planes, dy) in planes.zip(self.dy.chunks(group * image[1])) {
-            let images = Images {
-                planes,
-                dy,
-                steps: image,
-            };
-            let mut first = 0;
-            while first < channels_out {
-                let two = image[0] > FAR && first + width < channels_out;
-                first += match S::REGISTER_COUNT {
-                    32.. if two => self.add::<S, true>(simd, &images, &reads, first),
-                    _ => self.add::<S, false>(simd, &images, &reads, first),
+            for first in (0..channels_out).step_by(width) {
+                let images = Images {
+                    planes,
+                    dy: &dy[first / width * panel..],
+                    steps: image,
                 };
+                self.add(simd, &images, &reads, first);
             }
         }
     }
 }
 
 impl Share<'_> {
-    /// Adds the contribution of some images to one or two tiles of output channels, and returns the number of their columns.
+    /// Adds the contribution of some images to one tile of output channels.
     #[inline(always)]
-    fn add<S: Simd, const TWO: bool>(
+    fn add<S: Simd>(
         &mut self,
         simd: S,
         images: &Images<'_>,
         reads: &[[usize; ROWS]],
         first: usize,
-    ) -> usize {
+    ) {
         let width = tile::width::<S>();
         let channels_out = self.geometry.channels[1];
-        let panel = self.geometry.pixels_out() * width;
-        let [near, far] = [first, first + width].map(|at| at..channels_out.min(at + width));
+        let end = channels_out.min(first + width);
         let [rows_out, columns_out] = self.geometry.size_out();
         let step = self.layout.pixel(1, 0);
         let tiles = self.gradient.chunks_mut(ROWS * channels_out);
         for (gradient, places) in tiles.zip(reads) {
-            let [mut sums, mut others] = [tile::start(simd, [0.0; ROWS]); 2];
-            let rows = gradient.chunks_exact(channels_out);
-            for ((sum, other), row) in sums.iter_mut().zip(&mut others).zip(rows) {
-                *sum = tile::load(simd, &row[near.clone()]);
-                if TWO {
-                    *other = tile::load(simd, &row[far.clone()]);
-                }
+            let mut sums = tile::start(simd, [0.0; ROWS]);
+            for (sum, row) in sums.iter_mut().zip(gradient.chunks_exact(channels_out)) {
+                *sum = tile::load(simd, &row[first..end]);
             }
             let planes = images.planes.chunks_exact(images.steps[0]);
             for (planes, dy) in planes.zip(images.dy.chunks(images.steps[1])) {
@@ -213,29 +200,18 @@ impl Share<'_> {
                 for (read, place) in reads.iter_mut().zip(places) {
                     *read = &planes[*place..];
                 }
-                let of_a_row = columns_out * width;
-                let dy = &dy[first / width * panel..];
-                for row in 0..rows_out {
-                    let (read, at) = (row * step, row * of_a_row);
-                    let left = &dy[at..at + of_a_row];
-                    if TWO {
-                        let right = &dy[panel + at..panel + at + of_a_row];
-                        let both = [&mut sums, &mut others];
-                        tile::multiply_two(simd, reads, read, [left, right], both);
-                    } else {
-                        tile::multiply(simd, reads, read, left, &mut sums);
-                    }
+                let panels = dy.chunks_exact(columns_out * width).take(rows_out);
+                for (row, dy) in panels.enumerate() {
+                    tile::multiply(simd, reads, row * step, dy, &mut sums);
                 }
             }
-            let rows = gradient.chunks_exact_mut(channels_out);
-            for ((sum, other), row) in sums.into_iter().zip(others).zip(rows) {
-                tile::store::<S, _>(sum, &mut row[near.clone()]);
-                if TWO {
-                    tile::store::<S, _>(other, &mut row[far.clone()]);
-                }
+            for (sum, row) in sums
+                .into_iter()
+                .zip(gradient.chunks_exact_mut(channels_out))
+            {
+                tile::store::<S, _>(sum, &mut row[first..end]);
             }
         }
-        if TWO { 2 * width } else { width }
     }
 
     /// Positions from which the rows of a tile read: their channel, shifted by their tap; beyond the last row, those of the last.
