@@ -70,7 +70,6 @@ pub(super) fn multiply<S: Simd, const V: usize>(
 pub(super) fn multiply_two<S: Simd>(
     simd: S,
     rows: [&[f32]; ROWS],
-    start: usize,
     panels: [&[f32]; 2],
     sums: [&mut Sums<S>; 2],
 ) {
@@ -78,7 +77,7 @@ pub(super) fn multiply_two<S: Simd>(
     let right = &right[..left.len()];
     let [mut a, mut b, mut c, mut d, mut e, mut f] = rows;
     for row in [&mut a, &mut b, &mut c, &mut d, &mut e, &mut f] {
-        *row = &row[start..start + left.len()];
+        *row = &row[..left.len()];
     }
     let [first, second] = sums;
     let (mut lefts, mut rights) = (*first, *second);
@@ -208,6 +207,7 @@ mod tests {
             }
         }
     }
+
     struct Two<'a>(&'a [f32], &'a [f32]);
 
     impl WithSimd for Two<'_> {
@@ -220,11 +220,11 @@ mod tests {
                 |sums: Sums<S>| -> Vec<u32> { bytemuck::cast_slice(sums.as_flattened()).to_vec() };
             let alone = panels.map(|panel| {
                 let mut sums = start(simd, [0.5; ROWS]);
-                multiply(simd, rows, 1, panel, &mut sums);
+                multiply(simd, rows, 0, panel, &mut sums);
                 bits(sums)
             });
             let [mut left, mut right] = [start(simd, [0.5; ROWS]); 2];
-            multiply_two(simd, rows, 1, panels, [&mut left, &mut right]);
+            multiply_two(simd, rows, panels, [&mut left, &mut right]);
             [left, right].map(bits) == alone
         }
     }

@@ -171,7 +171,7 @@ impl Block<'_> {
                 } else {
                     let mut others = begin(y, &far);
                     let both = [&mut sums, &mut others];
-                    tile::multiply_two(simd, weights, 0, [panel, other], both);
+                    tile::multiply_two(simd, weights, [panel, other], both);
                     end(others, y, &far);
                 }
                 end(sums, y, &near);

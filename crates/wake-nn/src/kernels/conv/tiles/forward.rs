@@ -240,7 +240,7 @@ impl Block<'_> {
                     if let Some((next, product)) = next {
                         let mut others = sums;
                         let both = [&mut sums, &mut others];
-                        tile::multiply_two(simd, weights, 0, [panel, next], both);
+                        tile::multiply_two(simd, weights, [panel, next], both);
                         store(others, product);
                     } else {
                         tile::multiply(simd, weights, 0, panel, &mut sums);
