@@ -3,6 +3,7 @@ errors, never with a panic, a hang or a dead interpreter. ``SHIPWAKE_SECONDS`` s
 
 from __future__ import annotations
 
+import faulthandler
 import multiprocessing
 import os
 import random
@@ -18,6 +19,8 @@ import shipwake
 from shipwake import Dataset, Detector, Product, Sampler, Scene, errors
 
 SECONDS = float(os.environ.get("SHIPWAKE_SECONDS", "1"))
+# A call takes at most a few seconds: a test that takes longer hangs.
+HANGS = 300 + 2 * SECONDS
 ASSETS = Path(__file__).parents[2]
 
 
@@ -65,12 +68,15 @@ def spoil_all(files: dict[Path, bytes], seed: int) -> None:
 
 @contextmanager
 def changing(files: list[Path]) -> Iterator[None]:
+    """Another process changes the files meanwhile. If this takes too long, the interpreter is ended, even in the middle of Rust."""
     context = multiprocessing.get_context("spawn")
     process = context.Process(target=spoil_all, args=({path: path.read_bytes() for path in files}, 5), daemon=True)
     process.start()
+    faulthandler.dump_traceback_later(HANGS, exit=True)
     try:
         yield
     finally:
+        faulthandler.cancel_dump_traceback_later()
         process.kill()
         process.join()
 
