@@ -225,3 +225,38 @@ impl Mapper for Detector {
         Maps::new(rows / STRIDE, columns / STRIDE, values)
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::float_cmp, reason = "the same numbers")]
+mod tests {
+    use super::*;
+
+    /// Sure from the score of the calibration for what is known of the image; the rating follows it.
+    #[test]
+    fn the_calibration_says_what_is_sure() {
+        let device = Device::flex();
+        let detector = Detector::pretrained(&device).expect("weights");
+        let found = |detector: &Detector, score: f32| {
+            let wake = crate::wake::Wake {
+                tip: [10.0, 10.0],
+                axis_deg: 90.0,
+                half_angle_deg: 5.0,
+                length: 100.0,
+                snr: f32::INFINITY,
+                contrast_db: None,
+            };
+            detector.rated(vec![Detection::new(score, wake)])[0]
+        };
+        let unknown = detector.probabilities().expect("calibrated").sure_from;
+        assert_eq!(detector.sure_from(), unknown);
+        assert!(found(&detector, unknown).sure && !found(&detector, unknown - 1e-4).sure);
+        let known = detector.with_spacing(10.0).expect("in range");
+        let sure_from = known.probabilities().expect("calibrated").sure_from;
+        assert!(sure_from != unknown, "the two curves differ");
+        assert_eq!(known.sure_from(), sure_from);
+        let plain = known.with_calibration(None);
+        assert_eq!(plain.sure_from(), 0.25);
+        assert!(found(&plain, 0.25).sure && !found(&plain, 0.249).sure);
+        assert!(found(&plain, 0.9).probability.is_none());
+    }
+}

@@ -56,10 +56,10 @@ def spoil(path: Path, whole: bytes, chance: random.Random) -> None:
 
 
 def spoil_all(files: dict[Path, bytes], seed: int) -> None:
-    """Changes files at random until the process is ended."""
+    """Changes files at random until the process is ended, or the one that started it."""
     chance = random.Random(seed)
-    names = list(files)
-    while True:
+    names, parent = list(files), os.getppid()
+    while os.getppid() == parent:
         path = chance.choice(names)
         with suppress(OSError):
             spoil(path, files[path], chance)

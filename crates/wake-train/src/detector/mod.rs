@@ -10,6 +10,7 @@ mod clear;
 mod cluttered;
 mod data;
 mod draw;
+mod kind;
 mod labelled;
 mod painted;
 mod recipes;
@@ -19,6 +20,7 @@ mod sea;
 mod targets;
 mod training;
 
+pub use kind::Kind;
 pub use labelled::LabelledImages;
 pub use painted::Painted;
 pub use recipes::ImageRecipe;

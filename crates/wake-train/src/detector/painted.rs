@@ -1,6 +1,7 @@
 //! Painted images: a dark line, a bright streak beside it, a blob, correlated noise. No physics at all.
 
 use super::draw::Draw;
+use super::kind::Kind;
 use super::sample::{Sample, pixel_snr};
 use super::sea::{Echoes, Speckle, border, clutter, mottle, quick_look};
 use rayon::prelude::*;
@@ -88,6 +89,16 @@ impl Painted {
     /// Image number `index`, always the same one.
     #[must_use]
     pub fn sample(&self, index: u64) -> Sample {
+        self.sample_and_kinds(index).0
+    }
+
+    /// The kind of each wake of an image.
+    #[must_use]
+    pub fn kinds(&self, index: u64) -> Vec<Kind> {
+        self.sample_and_kinds(index).1
+    }
+
+    fn sample_and_kinds(&self, index: u64) -> (Sample, Vec<Kind>) {
         let draw = &mut Draw::new(self.seed, index);
         let size = self.size;
         let speckle = Speckle::draw(draw);
@@ -96,7 +107,7 @@ impl Painted {
         border(&mut mean, size, draw);
         let echoes = Echoes::draw(draw);
         let mut bright = vec![0.0; size * size];
-        let mut wakes: Vec<Wake> = Vec::new();
+        let (mut wakes, mut kinds) = (Vec::new(), Vec::new());
         // Ships of one image often have similar headings.
         let common = draw.between(0.0, 360.0);
         for _ in 0..draw.one_of(&[0.22, 0.45, 0.2, 0.13]) {
@@ -104,22 +115,24 @@ impl Painted {
                 true => common + draw.between(-8.0, 8.0) + 180.0 * draw.one_of(&[0.7, 0.3]) as f32,
                 false => draw.between(0.0, 360.0),
             };
-            let wake = wake(&mut mean, size, &speckle, axis_deg.rem_euclid(360.0), draw);
+            let (wake, kind) = wake(&mut mean, size, &speckle, axis_deg.rem_euclid(360.0), draw);
             if draw.chance(0.88) {
                 let shift = echoes.shift(draw);
                 echoes.add(&mut bright, size, [wake.tip, shift], wake.axis_deg, draw);
             }
             wakes.push(wake);
+            kinds.push(kind);
         }
         clutter(&mut bright, size, &echoes, draw);
         speckle.apply(&mut mean, size, draw);
         mean.iter_mut().zip(bright).for_each(|(m, b)| *m += b);
         let pixels = quick_look(mean, draw);
-        Sample {
+        let sample = Sample {
             size,
             pixels,
             wakes,
-        }
+        };
+        (sample, kinds)
     }
 }
 
@@ -149,8 +162,8 @@ impl Line {
     }
 }
 
-/// The lines of a wake, contrasts relative to the dark line, and the tangent of half their opening angle.
-fn lines(length: f32, draw: &mut Draw) -> (Vec<Line>, f32) {
+/// The lines of a wake, contrasts relative to the dark line, the tangent of half their opening angle, and their kind.
+fn lines(length: f32, draw: &mut Draw) -> (Vec<Line>, f32, Kind) {
     let zoom = draw.scale(0.7, 1.6);
     let side = draw.sign();
     let dark = Line {
@@ -177,11 +190,12 @@ fn lines(length: f32, draw: &mut Draw) -> (Vec<Line>, f32) {
         opening: 0.0,
         ..bright
     };
-    let mut lines = match draw.one_of(&[0.36, 0.2, 0.2, 0.14, 0.1]) {
-        0 => vec![dark, bright],
-        1 => vec![dark],
-        2 => vec![axis],
-        3 => vec![
+    let kind = Kind::ALL[draw.one_of(&Kind::SHARES)];
+    let mut lines = match kind {
+        Kind::DarkBesideBright => vec![dark, bright],
+        Kind::Dark => vec![dark],
+        Kind::Bright => vec![axis],
+        Kind::BrightBesideDark => vec![
             Line {
                 contrast: -axis.contrast * draw.between(0.2, 0.7),
                 beside: side * 1.8 * axis.width,
@@ -189,7 +203,7 @@ fn lines(length: f32, draw: &mut Draw) -> (Vec<Line>, f32) {
             },
             axis,
         ],
-        _ => {
+        Kind::Arms => {
             let opening = draw.between(2.0, 16.0).to_radians();
             let arm = |side: f32| Line {
                 beside: 0.0,
@@ -214,7 +228,7 @@ fn lines(length: f32, draw: &mut Draw) -> (Vec<Line>, f32) {
             half_angle = half_angle.max(opening);
         }
     }
-    (lines, half_angle)
+    (lines, half_angle, kind)
 }
 
 /// Draws a tip, most often in the image, whose wake is at least partly visible.
@@ -238,10 +252,16 @@ fn place(mean: &[f32], size: usize, axis_deg: f32, length: f32, draw: &mut Draw)
     tip
 }
 
-/// Multiplies a mean by a wake and returns the wake.
-fn wake(mean: &mut [f32], size: usize, speckle: &Speckle, axis_deg: f32, draw: &mut Draw) -> Wake {
+/// Multiplies a mean by a wake and returns the wake and its kind.
+fn wake(
+    mean: &mut [f32],
+    size: usize,
+    speckle: &Speckle,
+    axis_deg: f32,
+    draw: &mut Draw,
+) -> (Wake, Kind) {
     let length = draw.scale(35.0, 500.0);
-    let (lines, half_angle) = lines(length, draw);
+    let (lines, half_angle, kind) = lines(length, draw);
     let tip = place(mean, size, axis_deg, length, draw);
     let bend = match draw.chance(0.3) {
         true => draw.normal() * 12.0 / (length * length),
@@ -293,14 +313,15 @@ fn wake(mean: &mut [f32], size: usize, speckle: &Speckle, axis_deg: f32, draw: &
             reach = reach.max(along);
         }
     }
-    Wake {
+    let wake = Wake {
         tip,
         axis_deg,
         half_angle_deg: half_angle.atan().to_degrees(),
         length: reach.max(20.0),
         snr: (power / speckle.correlated_pixels()).sqrt(),
         contrast_db: None,
-    }
+    };
+    (wake, kind)
 }
 
 /// The largest contrast \[standard deviations of a pixel\].
@@ -347,9 +368,9 @@ mod tests {
         }
     }
 
-    /// The dark line lies where the label says: pixels along the ray are darker than those beside it.
+    /// The line lies where the label says: pixels along the ray are darker or brighter than those beside it, as the kind says.
     #[test]
-    fn a_dark_line_lies_on_its_ray() {
+    fn a_line_of_its_kind_lies_on_the_ray() {
         let (size, speckle) = (
             256,
             Speckle {
@@ -357,11 +378,12 @@ mod tests {
                 filter: [0.0; 2],
             },
         );
-        let mut found = 0;
+        let (mut found, mut wrong) = (0, 0);
         for index in 0..60 {
             let mut mean = vec![1.0; size * size];
             let draw = &mut Draw::new(1, index);
-            let wake = wake(&mut mean, size, &speckle, 37.0 * index as f32 % 360.0, draw);
+            let axis_deg = 37.0 * index as f32 % 360.0;
+            let (wake, kind) = wake(&mut mean, size, &speckle, axis_deg, draw);
             let grey = |along: f32, across: f32| {
                 let ([x, y], [right, down]) = (wake.at(along), wake.direction());
                 let (x, y) = ((x - across * down).round(), (y + across * right).round());
@@ -374,10 +396,16 @@ mod tests {
             };
             let (on, beside) = (mean_of(0.0), mean_of(60.0));
             assert!((beside - 1.0).abs() < 1e-6 || beside.is_nan());
+            let dark = match kind {
+                Kind::DarkBesideBright | Kind::Dark => true,
+                Kind::Bright | Kind::BrightBesideDark => false,
+                Kind::Arms => continue,
+            };
             found += usize::from((on - 1.0).abs() > 0.02);
+            wrong += usize::from((on - 1.0).abs() > 0.02 && (on < 1.0) != dark);
         }
-        // All but wakes outside the frame, a V that has opened, and the weakest.
-        assert!(found > 40, "{found} of 60");
+        // All but wakes outside the frame and the weakest; arms may cover a line.
+        assert!(found > 36 && wrong <= 2, "{found} of 60, {wrong} wrong");
     }
 
     /// The shipped network finds its confident detections again in the image turned by a quarter, on average with the same score.

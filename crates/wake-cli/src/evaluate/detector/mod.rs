@@ -11,13 +11,13 @@ use std::path::{Path, PathBuf};
 use image::RgbImage;
 use wake_detector::drawing::sheet;
 use wake_detector::{Finder, Radon};
-use wake_train::detector::ImageRecipe;
+use wake_train::detector::{ImageRecipe, Painted};
 use wake_train::detector::judging::{Searched, Tile, compared};
 
 use crate::exit::{self, Outcome};
 use crate::{named, picture, progress};
 use real_sea::HELD_OUT;
-use recall::{by_scene, by_visibility};
+use recall::{by_kind, by_scene, by_visibility};
 use report::Report;
 
 /// Evaluate the detector on held-out simulated images and on real tiles.
@@ -172,6 +172,13 @@ fn simulated(
     report.visibility.add(&by_visibility);
     if recipe == ImageRecipe::Detector {
         report.scenes = by_scene(recipe, &names, &searched);
+    }
+    if recipe == ImageRecipe::Painted {
+        let painted = Painted {
+            seed: HELD_OUT,
+            size: SIZE,
+        };
+        report.kinds = by_kind(painted, &names, &searched);
     }
     let megapixels = (SIZE * SIZE) as f64 * 1e-6;
     let path = options.out.join(format!("{}.png", recipe.name()));

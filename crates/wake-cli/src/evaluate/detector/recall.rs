@@ -6,7 +6,7 @@ use wake_detector::Wake;
 use wake_detector::score::{Rule, found_by};
 use wake_physics::Scene;
 use wake_physics::scene::Sensor;
-use wake_train::detector::ImageRecipe;
+use wake_train::detector::{ImageRecipe, Kind, Painted};
 use wake_train::detector::judging::Searched;
 
 /// False alarms per image at which recall is reported.
@@ -134,6 +134,22 @@ pub(crate) fn by_scene(recipe: ImageRecipe, finders: &[&str], searched: &Searche
     );
     recall.add(&by_angle);
     recall
+}
+
+/// A table of recall by kind of painted wakes.
+pub(crate) fn by_kind(painted: Painted, finders: &[&str], searched: &Searched) -> Recall {
+    let kinds: Vec<Vec<Kind>> = (0..searched.wakes.len() as u64)
+        .map(|index| painted.kinds(index))
+        .collect();
+    let names = Kind::ALL.map(|kind| kind.name().to_owned());
+    let bounds = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
+    let value = |image: usize, wake: usize| {
+        let kind = kinds[image].get(wake);
+        let number = Kind::ALL.iter().position(|one| Some(one) == kind);
+        number.map_or(f64::NAN, |n| n as f64)
+    };
+    let title = ["painted", "kind"];
+    table(title, &names, &bounds, (finders, searched), value)
 }
 
 /// Name of a sensor in scene files.

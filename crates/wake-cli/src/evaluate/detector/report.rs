@@ -27,6 +27,8 @@ pub(crate) struct Report {
     pub(crate) visibility: Recall,
     /// Recall by sensor, wind and heading.
     pub(crate) scenes: Recall,
+    /// Recall by kind of painted wakes.
+    pub(crate) kinds: Recall,
 }
 
 /// An interval as text.
@@ -58,8 +60,8 @@ impl Report {
     pub(crate) fn write(&self, folder: &Path) -> Outcome<()> {
         let rows = format!("{:#}\n", json!({"rows": self.rows, "sea": self.sea}));
         let recall = format!(
-            "images,by,range,found by,recall,wakes\n{}{}",
-            self.visibility.csv, self.scenes.csv
+            "images,by,range,found by,recall,wakes\n{}{}{}",
+            self.visibility.csv, self.scenes.csv, self.kinds.csv
         );
         let files = [
             ("report.json", rows),
@@ -185,6 +187,10 @@ impl Report {
             "\n## Recall by scene\n\nBy sensor, wind, and angle between wake and flight (0°: the ship sails along the flight).\n",
         );
         text.push_str(&self.scenes.text);
+        text.push_str(
+            "\n## Recall by kind\n\nBy what is painted along the axis of a wake; any kind may also have arms at 10 to 20°.\n",
+        );
+        text.push_str(&self.kinds.text);
         if !self.rungs.is_empty() {
             text.push_str(&self.transfer());
         }

@@ -147,3 +147,55 @@ fn layers<'a>(
         false => Err(mismatch),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use safetensors::tensor::{Dtype, TensorView};
+
+    /// Whether factors of these shapes fit a weight.
+    fn fit(down: &[usize], up: &[usize], weight: &[usize], dtype: Dtype) -> bool {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lora.safetensors");
+        let zeros = |shape: &[usize]| vec![0; 4 * shape.iter().product::<usize>()];
+        let (a, b) = (zeros(down), zeros(up));
+        let view = |shape: &[usize], bytes| TensorView::new(dtype, shape.to_vec(), bytes).unwrap();
+        let views = [
+            ("unet.to_q.lora_A.weight", view(down, &a)),
+            ("unet.to_q.lora_B.weight", view(up, &b)),
+        ];
+        safetensors::serialize_to_file(views, None, &path).unwrap();
+        let files = WeightFiles::open(&path).unwrap();
+        let stored = files.tensors().unwrap();
+        let shapes = BTreeMap::from([("to_q.weight".to_owned(), weight.to_vec())]);
+        match layers(&stored, &shapes, "unet") {
+            Ok(layers) => {
+                assert_eq!(layers.len(), 1);
+                true
+            }
+            Err(mismatch) => {
+                assert_eq!(mismatch.misshapen.len(), 1, "{mismatch:?}");
+                false
+            }
+        }
+    }
+
+    /// Each case differs from a fitting one in a single number.
+    #[test]
+    fn factors_fit_a_weight_of_their_outer_sizes() {
+        let linear = |down: &[usize], up: &[usize]| fit(down, up, &[6, 8], Dtype::F32);
+        assert!(linear(&[2, 8], &[6, 2]));
+        assert!(!linear(&[2, 7], &[6, 2]), "columns");
+        assert!(!linear(&[2, 8], &[5, 2]), "rows");
+        assert!(!linear(&[2, 8], &[6, 3]), "rank");
+        assert!(!linear(&[0, 8], &[6, 0]), "no rank");
+        assert!(!linear(&[2, 8], &[6, 2, 3]), "numbers left over");
+        assert!(!linear(&[16], &[6, 2]), "a list");
+        assert!(!linear(&[2, 8], &[12]), "a list");
+        assert!(!fit(&[2, 8], &[6, 2], &[6, 8], Dtype::I32), "whole numbers");
+        assert!(!fit(&[1, 1], &[6, 1], &[6], Dtype::F32), "a bias");
+        let convolution = |up: &[usize]| fit(&[2, 8, 3, 3], up, &[6, 8, 3, 3], Dtype::F32);
+        assert!(convolution(&[6, 2, 1, 1]));
+        assert!(!convolution(&[6, 2, 3, 3]), "a second window");
+    }
+}
