@@ -1,7 +1,7 @@
 //! Decodes the network's maps into wakes.
 
 use crate::network::{ANGLE_UNIT, LENGTH_UNIT, Map, OUTPUTS, STRIDE};
-use crate::wake::{Detection, Wake, angle_of, direction};
+use crate::wake::{Detection, Wake, angle_of, direction, turn};
 
 /// Network maps of one image, `[OUTPUTS, rows, columns]`; the first two are probabilities.
 #[derive(Debug, Clone)]
@@ -17,8 +17,9 @@ const LEAST_TIP: f32 = 0.02;
 const APART: usize = 2;
 /// Largest number of tips examined per image.
 const MOST_TIPS: usize = 300;
-/// Largest turn of the axis from the direction at the tip, and the step of the search \[deg\].
-const TURN: f32 = 24.0;
+/// Largest turn of the axis from the direction at the tip, and the step of the search \[deg\]: a line that is turned more is
+/// often an arm of the wake.
+const TURN: f32 = 12.0;
 const TURN_STEP: f32 = 1.5;
 /// First part of a ray that is skipped because a ship may lie on it \[cells\].
 const SKIPPED: usize = 2;
@@ -215,7 +216,7 @@ const OPPOSITE: f32 = 15.0;
 
 /// Whether a weaker wake is a stronger one followed from end to tip: a line has one tip.
 fn reversed(strong: &Wake, weak: &Wake, near: f32) -> bool {
-    let turn = (strong.axis_deg - weak.axis_deg).rem_euclid(360.0) - 180.0;
+    let turn = turn(weak.axis_deg + 180.0, strong.axis_deg);
     let (dx, dy) = (weak.tip[0] - strong.tip[0], weak.tip[1] - strong.tip[1]);
     let [right, down] = strong.direction();
     let (along, across) = (dx * right + dy * down, dy * right - dx * down);
@@ -226,7 +227,7 @@ fn reversed(strong: &Wake, weak: &Wake, near: f32) -> bool {
 
 /// Whether a weaker wake is a duplicate of a stronger one.
 pub(crate) fn same(strong: &Wake, weak: &Wake, near: f32) -> bool {
-    let turn = (strong.axis_deg - weak.axis_deg + 180.0).rem_euclid(360.0) - 180.0;
+    let turn = turn(weak.axis_deg, strong.axis_deg);
     let (dx, dy) = (weak.tip[0] - strong.tip[0], weak.tip[1] - strong.tip[1]);
     if dx.hypot(dy) < 0.5 * near {
         return true;
@@ -306,10 +307,27 @@ mod tests {
                 .iter()
                 .find(|d| d.wake.tip == wake.tip)
                 .expect("its tip");
-            let turn = (best.wake.axis_deg - wake.axis_deg + 180.0).rem_euclid(360.0) - 180.0;
+            let turn = turn(wake.axis_deg, best.wake.axis_deg);
             assert!(turn.abs() < 3.0 && best.score > 0.5, "{best:?}");
             assert!((best.wake.length - 120.0).abs() < 0.1);
         }
+    }
+
+    /// A line 8° off the direction at its tip is the axis, one 19° off, as arms are, is not.
+    #[test]
+    fn arms_are_not_the_axis() {
+        let turned = |degrees: f32| {
+            let mut maps = drawn(64, &[wake([41.5, 61.5], 90.0)]);
+            let (tip, area) = (15 * 64 + 10, 64 * 64);
+            let [right, down] = direction(90.0 - degrees);
+            maps.values[Map::TipRight as usize * area + tip] = right;
+            maps.values[Map::TipDown as usize * area + tip] = down;
+            maps.wake(tip)
+        };
+        let (axis, arm) = (turned(8.0), turned(19.5));
+        assert!(turn(90.0, axis.wake.axis_deg).abs() < 1.5, "{axis:?}");
+        assert!(turn(90.0, arm.wake.axis_deg).abs() > 7.0, "{arm:?}");
+        assert!(arm.score < 0.5 * axis.score, "{axis:?} {arm:?}");
     }
 
     /// A line in the opposite direction gives no support.

@@ -7,7 +7,7 @@ use crate::network::{MULTIPLE, STRIDE};
 use crate::normalize;
 use crate::raster::Raster;
 use crate::scaling::rescaled;
-use crate::wake::{Detection, Wake};
+use crate::wake::{Detection, Wake, turn};
 
 /// Computes maps of normalised images.
 pub(crate) trait Mapper: Sync {
@@ -36,6 +36,8 @@ const ALONG: f32 = 400.0;
 const TOGETHER: f32 = 1024.0;
 /// Tips closer than this are the same \[pixels of the image\].
 const NEAR: f32 = 40.0;
+/// Standard deviation of the axes at different scales that agree \[deg\].
+const AGREEING: f32 = 10.0;
 /// Longest side of a network input without known spacing \[pixels\].
 const LARGEST: f32 = 2560.0;
 
@@ -74,10 +76,11 @@ pub(crate) fn merged(found: Vec<Detection>) -> Vec<Detection> {
 /// Combines the wakes of all scales without duplicates, with higher scores for wakes found at several scales.
 ///
 /// ```text
-/// score = (max_i s_i + mean_i s_i)/2
+/// score = (max_i s_i + mean_i s_i·exp(−δ_i²/2·10²))/2
 /// ```
 ///
-/// with `s_i` the score at scale i, 0 if the wake is not found there.
+/// with `s_i` the score at scale i, 0 if the wake is not found there, and `δ_i` the turn of its axis from the axis at the scale
+/// with the highest score \[deg\].
 fn agreed(by_scale: &[Vec<Detection>]) -> Vec<Detection> {
     let count = by_scale.len().max(1) as f32;
     let kept = without_repeats(by_scale.iter().flatten().copied().collect(), NEAR);
@@ -88,10 +91,16 @@ fn agreed(by_scale: &[Vec<Detection>]) -> Vec<Detection> {
                 .filter(|other| same(&one.wake, &other.wake, NEAR));
             same.max_by(|a, b| a.score.total_cmp(&b.score)).copied()
         };
-        let seen: Vec<Detection> = by_scale.iter().filter_map(at).collect();
-        let sum: f32 = seen.iter().map(|other| other.score).sum();
-        let forward = |other: &Detection| Some(other.score * other.forward?);
-        let forward = seen.iter().map(forward).sum::<Option<f32>>();
+        let seen = by_scale.iter().filter_map(at);
+        let agreeing: Vec<(f32, Option<f32>)> = seen
+            .map(|other| {
+                let off = turn(one.wake.axis_deg, other.wake.axis_deg) / AGREEING;
+                (other.score * (-0.5 * off * off).exp(), other.forward)
+            })
+            .collect();
+        let sum: f32 = agreeing.iter().map(|(score, _)| score).sum();
+        let forward = agreeing.iter().map(|(score, f)| Some(score * (*f)?));
+        let forward = forward.sum::<Option<f32>>();
         Detection {
             score: 0.5 * (one.score + sum / count),
             forward: forward.filter(|_| sum > 0.0).map(|total| total / sum),
@@ -528,6 +537,27 @@ mod tests {
 
     /// A higher least score drops wakes and leaves the scores of the others: a wake with a score of 0.27 at one scale and nearly 1
     /// at the others keeps its mean over the scales.
+    /// A wake at a further scale raises the score the less, the more its axis is turned.
+    #[test]
+    fn scales_that_agree_raise_the_score() {
+        let at = |score: f32, axis_deg: f32| {
+            let wake = Wake {
+                tip: [50.0, 50.0],
+                axis_deg,
+                half_angle_deg: 10.0,
+                length: 100.0,
+                snr: f32::INFINITY,
+                contrast_db: None,
+            };
+            vec![Detection::new(score, wake)]
+        };
+        let score = |axis_deg: f32| agreed(&[at(0.8, 355.0), at(0.4, axis_deg)])[0].score;
+        assert!((score(355.0) - 0.7).abs() < 1e-6);
+        // One standard deviation, across zero.
+        assert!((score(5.0) - (0.6 + 0.1 * (-0.5f32).exp())).abs() < 1e-6);
+        assert!((score(175.0) - 0.6).abs() < 1e-6);
+    }
+
     #[test]
     fn the_least_score_holds_for_the_reported_scores() {
         let size = 400;

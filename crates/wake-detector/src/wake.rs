@@ -117,6 +117,11 @@ pub fn angle_of([right, down]: [f32; 2]) -> f32 {
     right.atan2(-down).to_degrees().rem_euclid(360.0) % 360.0
 }
 
+/// The turn from one angle to another \[deg\], −180 to 180.
+pub(crate) fn turn(from: f32, to: f32) -> f32 {
+    (to - from + 180.0).rem_euclid(360.0) - 180.0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -11,8 +11,8 @@ use std::path::{Path, PathBuf};
 use image::RgbImage;
 use wake_detector::drawing::sheet;
 use wake_detector::{Finder, Radon};
-use wake_train::detector::{ImageRecipe, Painted};
 use wake_train::detector::judging::{Searched, Tile, compared};
+use wake_train::detector::{ImageRecipe, Painted};
 
 use crate::exit::{self, Outcome};
 use crate::{named, picture, progress};

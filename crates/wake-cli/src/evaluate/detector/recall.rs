@@ -6,8 +6,8 @@ use wake_detector::Wake;
 use wake_detector::score::{Rule, found_by};
 use wake_physics::Scene;
 use wake_physics::scene::Sensor;
-use wake_train::detector::{ImageRecipe, Kind, Painted};
 use wake_train::detector::judging::Searched;
+use wake_train::detector::{ImageRecipe, Kind, Painted};
 
 /// False alarms per image at which recall is reported.
 pub(crate) const FALSE_ALARMS: f64 = 0.5;
