@@ -231,7 +231,7 @@ impl Mapper for Detector {
 mod tests {
     use super::*;
 
-    /// Sure from the score of the calibration for what is known of the image; the rating follows it.
+    /// The least score of sure detections comes from the calibration for known or unknown spacing, and is 0.25 without one.
     #[test]
     fn the_calibration_says_what_is_sure() {
         let device = Device::flex();

@@ -1,6 +1,6 @@
 //! Kinds of painted wakes.
 
-/// What runs along the axis of a painted wake; any kind may also have Kelvin arms.
+/// Line along the axis of a painted wake. Wakes of any kind may also have Kelvin arms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// A dark line with a bright streak at one side.
@@ -11,7 +11,7 @@ pub enum Kind {
     Bright,
     /// A bright line with a fainter dark streak at one side.
     BrightBesideDark,
-    /// Nothing: two bright arms.
+    /// No line, but two bright arms.
     Arms,
 }
 
@@ -24,7 +24,7 @@ impl Kind {
         Self::BrightBesideDark,
         Self::Arms,
     ];
-    /// How often each kind is painted, in the order of [`Kind::ALL`].
+    /// Share of each kind among painted wakes, in the order of [`Kind::ALL`].
     pub(super) const SHARES: [f32; 5] = [0.36, 0.2, 0.2, 0.14, 0.1];
 
     /// Its name in reports.

@@ -92,7 +92,7 @@ impl Painted {
         self.sample_and_kinds(index).0
     }
 
-    /// The kind of each wake of an image.
+    /// Kinds of the wakes of image number `index`, in the order of [`Sample::wakes`].
     #[must_use]
     pub fn kinds(&self, index: u64) -> Vec<Kind> {
         self.sample_and_kinds(index).1

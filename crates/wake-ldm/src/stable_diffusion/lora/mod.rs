@@ -153,7 +153,7 @@ mod tests {
     use super::*;
     use safetensors::tensor::{Dtype, TensorView};
 
-    /// Whether factors of these shapes fit a weight.
+    /// Compares factors of these shapes with a weight; true if they fit.
     fn fit(down: &[usize], up: &[usize], weight: &[usize], dtype: Dtype) -> bool {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("lora.safetensors");

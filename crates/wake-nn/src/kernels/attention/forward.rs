@@ -54,7 +54,7 @@ impl WithSimd for Vectors<'_> {
     }
 }
 
-/// Whether tokens leave as few places empty in wide tiles as in tiles of two vectors.
+/// True if wide tiles have no more empty places than tiles of two vectors.
 pub(super) fn fills_wide<S: Simd>(tokens: usize) -> bool {
     let [few, many] = [2, WIDE].map(|vectors| tokens.next_multiple_of(vectors * S::F32_LANES));
     few == many
