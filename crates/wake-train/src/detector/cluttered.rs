@@ -10,14 +10,13 @@ use wake_physics::labels::WakeLabel;
 use wake_physics::measure::median;
 
 use super::draw::Draw;
+use super::hidden::{HIDES, free_share};
 use super::sea::{Echoes, border, clutter, filaments, front};
 
 /// Share of images with a front.
 const FRONTS: f32 = 0.12;
 /// Share of images with filaments.
 const FILAMENTS: f32 = 0.15;
-/// Brightness above which clutter hides a wake, in medians of the image.
-const HIDES: f32 = 0.5;
 /// Random numbers of the clutter, apart from those of other draws of the same seed.
 const STREAM: u64 = 0xC1_77E5;
 
@@ -70,14 +69,7 @@ fn hide(wake: &mut WakeLabel, size: usize, hidden: impl Fn(usize) -> bool) {
         return;
     };
     let [from, to] = [[a, b], [c, d]].map(|[p, q]| [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])]);
-    const PLACES: usize = 64;
-    let inside = |x: f64| (x >= 0.0 && x < size as f64 - 0.5).then(|| x.round() as usize);
-    let free = (0..PLACES).filter(|&k| {
-        let t = (k as f64 + 0.5) / PLACES as f64;
-        let [x, y] = [0, 1].map(|axis| inside(from[axis] + t * (to[axis] - from[axis])));
-        x.zip(y).is_none_or(|(x, y)| !hidden(y * size + x))
-    });
-    visibility.snr *= (free.count() as f64 / PLACES as f64).sqrt();
+    visibility.snr *= free_share([from, to], size, hidden).sqrt();
 }
 
 impl Source for Cluttered {

@@ -1,6 +1,6 @@
 //! Kinds of painted wakes.
 
-/// Line along the axis of a painted wake. Wakes of any kind may also have Kelvin arms.
+/// Line along the axis of a painted wake. All kinds but [`Kind::Arms`] may also have Kelvin arms; beside a bright axis, arms are fainter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// A dark line with a bright streak at one side.

@@ -10,6 +10,7 @@ mod clear;
 mod cluttered;
 mod data;
 mod draw;
+mod hidden;
 mod kind;
 mod labelled;
 mod painted;

@@ -1,6 +1,7 @@
 //! Painted images: a dark line, a bright streak beside it, a blob, correlated noise. No physics at all.
 
 use super::draw::Draw;
+use super::hidden::{HIDES, free_share};
 use super::kind::Kind;
 use super::sample::{Sample, pixel_snr};
 use super::sea::{Echoes, Speckle, border, clutter, mottle, quick_look};
@@ -123,9 +124,15 @@ impl Painted {
             wakes.push(wake);
             kinds.push(kind);
         }
-        clutter(&mut bright, size, &echoes, draw);
+        let mut over = vec![0.0; size * size];
+        clutter(&mut over, size, &echoes, draw);
+        for wake in &mut wakes {
+            hide(wake, size, &over);
+        }
         speckle.apply(&mut mean, size, draw);
-        mean.iter_mut().zip(bright).for_each(|(m, b)| *m += b);
+        for ((m, bright), over) in mean.iter_mut().zip(bright).zip(over) {
+            *m += bright + over;
+        }
         let pixels = quick_look(mean, draw);
         let sample = Sample {
             size,
@@ -214,12 +221,18 @@ fn lines(length: f32, draw: &mut Draw) -> (Vec<Line>, f32, Kind) {
         }
     };
     let mut half_angle = lines.iter().map(|l| l.opening.abs()).fold(0.0, f32::max);
+    // Arms are told from a bright axis by being fainter.
+    let strength = match kind {
+        Kind::DarkBesideBright | Kind::Dark => 1.0,
+        Kind::Bright | Kind::BrightBesideDark => 0.5 * axis.contrast,
+        Kind::Arms => 0.0,
+    };
     for side in [-1.0, 1.0] {
-        if draw.chance(0.25) {
+        if strength > 0.0 && draw.chance(0.25) {
             let opening = draw.between(10.0, 20.0).to_radians().tan();
             let sign = if draw.chance(0.75) { 0.8 } else { -0.5 };
             lines.push(Line {
-                contrast: sign * draw.scale(0.5, 1.5),
+                contrast: strength * sign * draw.scale(0.5, 1.5),
                 fade: length * draw.scale(0.4, 1.2),
                 width: zoom * draw.scale(1.2, 4.0),
                 beside: 0.0,
@@ -324,6 +337,13 @@ fn wake(
     (wake, kind)
 }
 
+/// Lowers a wake's signal-to-noise ratio by the part of its line under clutter.
+fn hide(wake: &mut Wake, size: usize, clutter: &[f32]) {
+    let ends = [0.0, wake.length].map(|along| wake.at(along).map(f64::from));
+    let free = free_share(ends, size, |i| clutter[i] > HIDES);
+    wake.snr *= free.sqrt() as f32;
+}
+
 /// The largest contrast \[standard deviations of a pixel\].
 const MOST: f32 = 4.0;
 /// Least visible contrast \[standard deviations of a pixel\].
@@ -363,7 +383,9 @@ mod tests {
                     apart < 1e-3 && (a.axis_deg - b.axis_deg).abs() < 1e-3,
                     "{a:?} {b:?}"
                 );
-                assert!((a.length - b.length).abs() < 1e-3 && (a.snr / b.snr - 1.0).abs() < 1e-4);
+                assert!(
+                    (a.length - b.length).abs() < 1e-3 && (a.snr - b.snr).abs() <= 1e-4 * a.snr
+                );
             }
         }
     }
@@ -406,6 +428,49 @@ mod tests {
         }
         // All but wakes outside the frame and the weakest; arms may cover a line.
         assert!(found > 36 && wrong <= 2, "{found} of 60, {wrong} wrong");
+    }
+
+    /// The brightest line of a bright kind is its axis; two arms have no third one.
+    #[test]
+    fn arms_are_fainter_than_a_bright_axis() {
+        let mut arms = 0;
+        for index in 0..200 {
+            let (lines, _, kind) = lines(100.0, &mut Draw::new(1, index));
+            let strongest = |open: bool| {
+                let of = |line: &&Line| (line.opening.abs() > 0.17) == open;
+                let contrasts = lines.iter().filter(of).map(|line| line.contrast.abs());
+                contrasts.fold(0.0, f32::max)
+            };
+            match kind {
+                Kind::Bright | Kind::BrightBesideDark => {
+                    assert!(strongest(true) < 0.61 * strongest(false));
+                    arms += usize::from(strongest(true) > 0.0);
+                }
+                Kind::Arms => assert_eq!(lines.len(), 2),
+                Kind::DarkBesideBright | Kind::Dark => {}
+            }
+        }
+        assert!(arms > 10, "{arms}");
+    }
+
+    /// Land over three quarters of a line leaves half its signal-to-noise ratio.
+    #[test]
+    fn a_wake_under_land_is_weaker() {
+        let size = 96;
+        let land: Vec<f32> = (0..size * size)
+            .map(|i| if i % size < 70 { 2.0 } else { 0.1 })
+            .collect();
+        let mut wake = Wake {
+            tip: [90.0, 40.0],
+            axis_deg: 270.0,
+            half_angle_deg: 0.0,
+            length: 80.0,
+            snr: 12.0,
+            contrast_db: None,
+        };
+        hide(&mut wake, size, &land);
+        // One of 64 places more or less.
+        assert!((wake.snr - 6.0).abs() < 0.2, "{}", wake.snr);
     }
 
     /// The shipped network finds its confident detections again in the image turned by a quarter, on average with the same score.

@@ -188,7 +188,7 @@ impl Report {
         );
         text.push_str(&self.scenes.text);
         text.push_str(
-            "\n## Recall by kind\n\nBy the line painted along the axis of a wake. Wakes of any kind may also have arms at 10 to 20°.\n",
+            "\n## Recall by kind\n\nBy the line painted along the axis of a wake. All but the last kind may also have arms at 10 to 20°, fainter ones beside a bright line.\n",
         );
         text.push_str(&self.kinds.text);
         if !self.rungs.is_empty() {

@@ -1,0 +1,54 @@
+//! Parts of wakes under painted clutter.
+
+/// Brightness above which clutter hides a wake, in medians of the image.
+pub(super) const HIDES: f32 = 0.5;
+/// Number of places at which a line is looked at.
+const PLACES: usize = 64;
+
+/// Share of a line's places in an image that nothing hides; 1 for a line outside of it.
+///
+/// - `from`, `to`: ends (column, row) of the line
+/// - `size`: rows and columns of the image
+/// - `hidden`: whether the pixel of an index, row by row, is hidden
+pub(super) fn free_share(
+    [from, to]: [[f64; 2]; 2],
+    size: usize,
+    hidden: impl Fn(usize) -> bool,
+) -> f64 {
+    let inside = |x: f64| (x >= 0.0 && x < size as f64 - 0.5).then(|| x.round() as usize);
+    let pixel = |k: usize| {
+        let t = (k as f64 + 0.5) / PLACES as f64;
+        let [x, y] = [0, 1].map(|axis| inside(from[axis] + t * (to[axis] - from[axis])));
+        Some(y? * size + x?)
+    };
+    let (mut places, mut free) = (0, 0);
+    for i in (0..PLACES).filter_map(pixel) {
+        places += 1;
+        free += usize::from(!hidden(i));
+    }
+    match places {
+        0 => 1.0,
+        places => free as f64 / f64::from(places),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Right of a column everything is hidden; parts of the line outside of the image do not count.
+    #[test]
+    fn a_line_is_free_up_to_a_coast() {
+        for (line, coast, expected) in [
+            ([[0.0, 15.0], [80.0, 15.0]], 20, 0.25),
+            ([[0.0, 15.0], [80.0, 15.0]], 96, 1.0),
+            ([[0.0, 15.0], [80.0, 15.0]], 0, 0.0),
+            ([[-80.0, 15.0], [80.0, 15.0]], 20, 0.25),
+            ([[5.0, -20.0], [5.0, -80.0]], 0, 1.0),
+        ] {
+            let share = free_share(line, 96, |i| i % 96 >= coast);
+            // One of the 32 or 64 places in the image more or less.
+            assert!((share - expected).abs() < 0.04, "{share} {expected}");
+        }
+    }
+}
