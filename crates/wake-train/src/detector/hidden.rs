@@ -2,10 +2,10 @@
 
 /// Brightness above which clutter hides a wake, in medians of the image.
 pub(super) const HIDES: f32 = 0.5;
-/// Number of places at which a line is looked at.
+/// Number of samples along a line.
 const PLACES: usize = 64;
 
-/// Share of a line's places in an image that nothing hides; 1 for a line outside of it.
+/// Share of the samples of a line inside an image that nothing hides; 1 for a line outside the image.
 ///
 /// - `from`, `to`: ends (column, row) of the line
 /// - `size`: rows and columns of the image
@@ -47,7 +47,7 @@ mod tests {
             ([[5.0, -20.0], [5.0, -80.0]], 0, 1.0),
         ] {
             let share = free_share(line, 96, |i| i % 96 >= coast);
-            // One of the 32 or 64 places in the image more or less.
+            // One of the 32 or 64 samples in the image more or less.
             assert!((share - expected).abs() < 0.04, "{share} {expected}");
         }
     }

@@ -221,7 +221,7 @@ fn lines(length: f32, draw: &mut Draw) -> (Vec<Line>, f32, Kind) {
         }
     };
     let mut half_angle = lines.iter().map(|l| l.opening.abs()).fold(0.0, f32::max);
-    // Arms are told from a bright axis by being fainter.
+    // Arms are fainter than a bright axis, so that the image shows which line is the axis.
     let strength = match kind {
         Kind::DarkBesideBright | Kind::Dark => 1.0,
         Kind::Bright | Kind::BrightBesideDark => 0.5 * axis.contrast,
