@@ -3,7 +3,7 @@
 /// Brightness above which clutter hides a wake, in medians of the image.
 pub(super) const HIDES: f32 = 0.5;
 /// Number of samples along a line.
-const PLACES: usize = 64;
+const SAMPLES: usize = 64;
 
 /// Share of the samples of a line inside an image that nothing hides; 1 for a line outside the image.
 ///
@@ -17,18 +17,18 @@ pub(super) fn free_share(
 ) -> f64 {
     let inside = |x: f64| (x >= 0.0 && x < size as f64 - 0.5).then(|| x.round() as usize);
     let pixel = |k: usize| {
-        let t = (k as f64 + 0.5) / PLACES as f64;
+        let t = (k as f64 + 0.5) / SAMPLES as f64;
         let [x, y] = [0, 1].map(|axis| inside(from[axis] + t * (to[axis] - from[axis])));
         Some(y? * size + x?)
     };
-    let (mut places, mut free) = (0, 0);
-    for i in (0..PLACES).filter_map(pixel) {
-        places += 1;
+    let (mut samples, mut free) = (0, 0);
+    for i in (0..SAMPLES).filter_map(pixel) {
+        samples += 1;
         free += usize::from(!hidden(i));
     }
-    match places {
+    match samples {
         0 => 1.0,
-        places => free as f64 / f64::from(places),
+        samples => free as f64 / f64::from(samples),
     }
 }
 

@@ -473,6 +473,30 @@ mod tests {
         assert!((wake.snr - 6.0).abs() < 0.2, "{}", wake.snr);
     }
 
+    /// Bright clutter over a whole line leaves no signal. (Lines in the border have none either, and are black.)
+    #[test]
+    fn a_covered_wake_has_no_signal() {
+        let size = 96;
+        let source = Painted { seed: 5, size };
+        let mut covered = 0;
+        for index in 0..200 {
+            let sample = source.sample(index);
+            let mut levels = sample.pixels.clone();
+            levels.sort_by(f32::total_cmp);
+            for wake in sample.wakes.iter().filter(|wake| wake.snr < 1e-6) {
+                let along = (0..64).map(|k| wake.at(wake.length * k as f32 / 64.0));
+                let inside = |at: &[f32; 2]| at.iter().all(|x| (0.0..95.5).contains(x));
+                let line: Vec<f32> = along
+                    .filter(inside)
+                    .map(|[x, y]| sample.pixels[y.round() as usize * size + x.round() as usize])
+                    .collect();
+                let mean = line.iter().sum::<f32>() / line.len() as f32;
+                covered += usize::from(mean > levels[levels.len() / 2]);
+            }
+        }
+        assert!(covered > 0);
+    }
+
     /// The shipped network finds its confident detections again in the image turned by a quarter, on average with the same score.
     /// A single score may differ where both ends of a line could be its tip, or be 0 beside filaments.
     #[test]
