@@ -18,7 +18,7 @@ const REACH: f64 = 2.0;
 /// origin is the same place in both images, so the labels of the delivered scene hold unchanged.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Delivery {
-    /// Pixel size of the product over that of the delivered image, 0.25 to 4.
+    /// Pixel size of the product over the pixel size of the delivered image, 0.25 to 4.
     pub resize: f64,
     /// JPEG quality, 1 to 100; `None` for no compression.
     pub quality: Option<u8>,

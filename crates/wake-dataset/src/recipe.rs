@@ -286,7 +286,7 @@ impl Recipe {
         self.changed(parsed(text)?, text)
     }
 
-    /// Replaces values by those of a table; `text` is the source of the table, for messages.
+    /// Replaces values by a table's values; `text` is the source of the table, for messages.
     fn changed(&self, mut changes: toml::Table, text: &str) -> Result<Self> {
         let fail = |message: String| Error::Recipe {
             message: sentence(&message),
@@ -375,7 +375,7 @@ fn one_line(text: &str, error: &toml::de::Error) -> String {
     }
 }
 
-/// Renames the radar's keys to those of a serialized scene.
+/// Renames the radar's keys as in a serialized scene.
 fn with_stored_keys(changes: &mut toml::Table) {
     let scene = changes.get_mut("scene").and_then(toml::Value::as_table_mut);
     let radar = scene.and_then(|scene| scene.get_mut("radar"));
@@ -390,7 +390,7 @@ fn with_stored_keys(changes: &mut toml::Table) {
     *radar = std::mem::take(radar).into_iter().map(stored).collect();
 }
 
-/// Replaces values of `table` by those of `changes`, recursively.
+/// Replaces values of `table` by values of `changes`, recursively.
 fn merge(table: &mut toml::Table, changes: toml::Table) {
     for (key, change) in changes {
         match (table.get_mut(&key), change) {

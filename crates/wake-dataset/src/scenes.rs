@@ -587,7 +587,7 @@ mod tests {
         assert!(message.to_string().contains("no/such.toml"), "{message}");
     }
 
-    /// Half of the scenes of `model` have the values of `ranges`, the other half those of `satellites`.
+    /// Half of the scenes of `model` have the values of `ranges`, the other half the values of `satellites`.
     #[test]
     fn the_recipe_of_the_model_has_the_scenes_of_both() {
         let source = Simulated::new(Recipe::model().unwrap(), 3).unwrap();

@@ -182,7 +182,7 @@ impl Network {
         )
     }
 
-    /// Computes the maps of a batch of images, in the images' type of numbers; layers compute in that of the weights.
+    /// Computes the maps of a batch of images, in the images' number type; layers compute in the number type of the weights.
     ///
     /// # Shapes
     ///

@@ -39,7 +39,7 @@ pub fn self_check(network: &Network, weights: &Path, device: &Device) -> Result<
     }
 }
 
-/// Compares the maps of the shipped network on a device with those of the CPU backend flex.
+/// Compares the maps of the shipped network on a device with its maps on the CPU backend flex.
 ///
 /// # Errors
 ///

@@ -28,7 +28,7 @@ fn write(product: &str, lines: Range<usize>, pixels: Range<usize>) -> (tempfile:
     (folder, product)
 }
 
-/// Places, times, incidence, calibration and noise of a part are those of the whole, and σ⁰ follows from both.
+/// A part and the whole product have the same places, times, incidence, calibration and noise, and σ⁰ follows from both.
 #[test]
 fn a_part_lies_where_it_lay() {
     for name in PRODUCTS {

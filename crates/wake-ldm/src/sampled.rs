@@ -18,7 +18,7 @@ impl Sea for SeaTexture {
 
 /// Scenes of a recipe with images sampled from the wake model, one batch at a time.
 ///
-/// The model samples only scenes within its training ranges; those of the embedded model cover all scenes of the recipes
+/// The model samples only scenes within its training ranges; the embedded model covers all scenes of the recipes
 /// `ranges`, `satellites` and `model`.
 #[derive(Debug, Clone)]
 pub struct Sampled {

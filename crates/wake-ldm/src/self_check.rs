@@ -14,7 +14,7 @@ use crate::unet::{UNetConfig, UNetInput};
 /// Results of the flex backend.
 const REFERENCE: &[u8] = include_bytes!("../assets/self_check.safetensors");
 
-/// Runs a small Stable Diffusion model of every kind on a device and compares the results with those of the CPU backend flex.
+/// Runs a small Stable Diffusion model of every kind on a device and compares the results with results of the CPU backend flex.
 ///
 /// Takes about a second, longer on GPUs, because kernels are compiled. Pipelines run it automatically when
 /// they are made on a device that is not a CPU, once per device.

@@ -263,7 +263,7 @@ impl Middle {
         middle
     }
 
-    /// Half the length along a direction (right, down), that of a uniform bar: √3 standard deviations.
+    /// Half the length along a direction (right, down), as if the echo were a uniform bar: √3 standard deviations.
     fn half_length(&self, [right, down]: [f64; 2]) -> f64 {
         let [xx, yy, xy] = self.squares;
         let variance = right * right * xx + down * down * yy + 2.0 * right * down * xy;

@@ -53,7 +53,7 @@ pub(crate) struct Surroundings {
     brightest: f64,
 }
 
-/// Brightness of a line over that of the sea beside it, and the deviation of this ratio from 1 in standard deviations.
+/// Brightness of a line over the brightness of the sea beside it, and the deviation of this ratio from 1 in standard deviations.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Contrast {
     ratio: f64,

@@ -99,7 +99,7 @@ mod native {
         Ok(state.map(tensor_of))
     }
 
-    /// Rounds every operation as that of a whole tensor would.
+    /// Rounds every operation as an operation on whole tensors would.
     fn update(step: &Step, g: &[f32], [w, m, v, a]: [&mut [f32]; 4]) {
         let [of_first, of_second] = [1.0 - step.beta_1, 1.0 - step.beta_2];
         let all = g.iter().zip(w).zip(m.iter_mut().zip(v).zip(a));

@@ -81,7 +81,7 @@ pub enum Error {
         value: f64,
     },
 
-    /// The tensors of a file do not match those of the model; nothing was loaded.
+    /// The tensors of a file do not match the tensors of the model; nothing was loaded.
     #[error("{} does not fit the model: {mismatch}", path.display())]
     WeightsMismatch {
         path: PathBuf,
@@ -125,7 +125,7 @@ pub enum Error {
     )]
     NotFinite { what: String },
 
-    /// The results of a device differ from those of the reference backend.
+    /// The results of a device differ from the results of the reference backend.
     #[error(
         "device {device} computes wrong numbers: {stage} differs by {difference:e} of its largest \
          value, allowed {allowed:e}; use another device or driver"

@@ -5,7 +5,7 @@ use burn::tensor::Tensor;
 
 /// Applies a linear layer to every token, `y = x W + b`.
 ///
-/// The result is that of `Linear::forward`, computed faster for large layers on burn's CPU backend.
+/// The result equals the result of `Linear::forward`, computed faster for large layers on burn's CPU backend.
 ///
 /// # Shapes
 ///

@@ -27,7 +27,7 @@ pub struct ShipAt {
 
 /// Largest number of ships in a file.
 const MOST_SHIPS: usize = 10_000;
-/// Default ratios of length to beam and length to draft: those of the default scene's ship.
+/// Default ratios of length to beam and length to draft, as of the default scene's ship.
 const SLENDERNESS: [f64; 2] = [7.5, 19.5];
 
 /// Reads ships from a GeoJSON file: `Point` features with the properties `heading`, `speed`, `length` and optionally `beam`

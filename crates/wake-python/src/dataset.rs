@@ -117,7 +117,7 @@ impl PySimulated {
         )
     }
 
-    /// Writes the first `count` pairs, or those of a shard, into a folder; calls `watch(done, total)` to report progress.
+    /// Writes the first `count` pairs, or a shard's share of these pairs, into a folder; calls `watch(done, total)` to report progress.
     #[expect(clippy::too_many_arguments, reason = "all are named in Python")]
     fn write(
         &self,

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! `state.json` holds checksums of the tensor file and of itself. Tensors are written and read one by one, so the extra memory
-//! is at most that of the largest tensor.
+//! is at most the size of the largest tensor.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;

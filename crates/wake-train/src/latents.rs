@@ -27,7 +27,7 @@ const RESIDUALS: usize = 8;
 pub(crate) struct Example {
     /// The scene that made the image.
     pub scene: Scene,
-    /// Mean grey of the image less that of the expected image.
+    /// Mean grey of the image minus mean grey of the expected image.
     pub grey: f32,
     /// Log standard deviations of the sea in the channels, see [`PhysicsPrior`].
     pub log_deviations: Vec<f32>,

@@ -258,7 +258,7 @@ mod tests {
         }
     }
 
-    /// Weights are those of burn's `AdamW`, bit by bit.
+    /// Weights equal the weights of burn's `AdamW`, bit by bit.
     #[test]
     fn steps_are_those_of_burn() {
         let options = AdamOptions::default();

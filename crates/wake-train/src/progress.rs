@@ -18,7 +18,7 @@ pub enum Progress {
     More(u64),
     /// A step of a stage was made.
     Step {
-        /// Steps made so far, including those of earlier runs.
+        /// Steps made so far, including steps of earlier runs.
         step: usize,
         /// Loss of this step.
         loss: f64,

@@ -13,7 +13,7 @@ use wake_ldm::unet::{UNetConfig, UNetInput};
 /// Gradients computed by flex.
 const REFERENCE: &[u8] = include_bytes!("../assets/self_check.safetensors");
 
-/// Computes the gradients of a small U-Net on a device and compares them with those of the CPU backend flex.
+/// Computes the gradients of a small U-Net on a device and compares them with gradients of the CPU backend flex.
 ///
 /// Runs do this automatically, once for each device other than a CPU.
 ///

@@ -60,7 +60,7 @@ pub struct PipelineTraining<'a> {
     pub latents: LatentShape,
     /// Steps of text encoder and U-Net after which to stop, to be resumed later; `None`: all.
     pub stop_after: Option<usize>,
-    /// Options of the stages; the steps are those of text encoder and U-Net.
+    /// Options of the stages; `steps` counts the steps of text encoder and U-Net.
     pub options: StageOptions,
 }
 

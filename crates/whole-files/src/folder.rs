@@ -67,7 +67,7 @@ pub fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// Removes temporary files of killed processes from a folder; keeps those of running ones.
+/// Removes temporary files of killed processes from a folder; keeps the files of running ones.
 ///
 /// # Errors
 ///

@@ -16,7 +16,7 @@ const THREADS: [usize; 5] = [1, 2, 4, 8, 16];
 const BATCH: usize = 16;
 /// Least time that is measured, with at least a batch of each thread, after as many warm-up batches.
 const LEAST: Duration = Duration::from_secs(5);
-/// Seed of both sources, whose scenes are those of the recipe `satellites`.
+/// Seed of both sources, which draw scenes of the recipe `satellites`.
 const SEED: u64 = 3;
 
 /// Speed of one source through the loader.

@@ -24,7 +24,7 @@ pub(crate) struct SpacingRow {
     seconds: f64,
     /// Root mean square difference from the finest spacing, over the mean \[1\].
     error: f64,
-    /// Order of convergence: logarithm of the ratio of this error to the next finer one's, over that of their spacings.
+    /// Order of convergence: log(error / next finer error) / log(spacing / next finer spacing).
     order: Option<f64>,
 }
 

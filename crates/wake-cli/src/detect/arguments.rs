@@ -23,7 +23,7 @@ pub(crate) struct Arguments {
     /// product: a Sentinel-1 .SAFE folder or .zip, or a GeoTIFF
     #[arg(required = true, value_name = "FILE|DIR")]
     pub(super) images: Vec<PathBuf>,
-    /// Pixel spacing (m) [default: that of a product; otherwise the scale is estimated from the speckle]
+    /// Pixel spacing (m) [default: the product's spacing; for images, the scale is estimated from the speckle]
     #[arg(long, value_parser = named::spacing)]
     pub(super) spacing: Option<f32>,
     /// Detection method for images; products are searched with the network

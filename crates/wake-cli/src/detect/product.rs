@@ -187,7 +187,7 @@ fn watch(bar: &ProgressBar, done: usize, of: usize) {
     bar.set_position(done as u64);
 }
 
-/// Pixel spacing \[m\]: the one given, or that of the product.
+/// Pixel spacing \[m\]: as given, or the product's.
 fn spacing(product: &Product, asked: Option<f32>) -> Outcome<Option<f32>> {
     if asked.is_some() || !product.has_places() {
         return Ok(asked);

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 #[derive(Args)]
 #[command(
     after_help = "Scene keys with their units, ranges and defaults: docs/scene_keys.md\n\
-                  grid.spacing is that of the image; the plan says which spacing is computed on (computed_spacing): docs/scene.md"
+                  grid.spacing is the image's spacing; the plan says which spacing is computed on (computed_spacing): docs/scene.md"
 )]
 pub(crate) struct Arguments {
     /// Scene files (TOML), one or more [default: the default scene, with a ship]

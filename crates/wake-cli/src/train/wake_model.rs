@@ -39,7 +39,7 @@ pub(crate) struct Options {
     part: Trained,
     #[command(flatten)]
     pairs: Pairs,
-    /// JSON file with the widths of the model [default: those of the shipped model]
+    /// JSON file with the widths of the model [default: widths of the shipped model]
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Training steps [default: parser 4000, prior 6000, flow 6000]

@@ -272,7 +272,7 @@ fn a_data_set_is_trained_on() {
     );
 }
 
-/// A few labelled images: a network is trained without two of three, and judged on images that it has not seen.
+/// A few labelled images: a network is trained without two of three, and evaluated on images that it has not seen.
 #[test]
 fn labelled_images_are_trained_on_and_left_out() {
     let folder = tempfile::tempdir().expect("a folder");

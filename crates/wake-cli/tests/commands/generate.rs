@@ -175,7 +175,7 @@ fn two_images_have_a_sheet_labels_and_a_report() {
     );
 }
 
-/// Keys of a scene in the place of a prompt, on the base of the scene that the model was trained on.
+/// Keys of a scene instead of a prompt; other keys keep the values of the scene that the model was trained on.
 #[test]
 fn a_scene_is_asked_for_by_its_keys() {
     let folder = tempfile::tempdir().expect("a folder");

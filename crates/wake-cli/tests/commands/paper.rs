@@ -63,7 +63,7 @@ fn the_experiment_runs_from_end_to_end() {
     );
 }
 
-/// SSIM and PSNR of the model beside those of a second simulated image, and the spectrum in three bands.
+/// SSIM and PSNR of the model beside SSIM and PSNR of a second simulated image, and the spectrum in three bands.
 fn has_table_ii(report: &Value) {
     let rows = report["pixels"].as_array().expect("rows");
     let names: Vec<&str> = rows

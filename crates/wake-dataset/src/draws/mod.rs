@@ -43,7 +43,7 @@ pub struct Draws {
 
 /// Number of ships.
 const COUNT: &str = "count";
-/// Grey level of the median amplitude, less that of zero amplitude, and grey level of zero amplitude; see [`Draws::quick_look`].
+/// Grey level of the median amplitude minus grey level of zero amplitude, and grey level of zero amplitude; see [`Draws::quick_look`].
 const GAIN: &str = "quick_look.gain";
 const OFFSET: &str = "quick_look.offset";
 /// Image pixels per resolution cell, as the geometric mean of both axes; 0 keeps the spacing.
@@ -102,7 +102,7 @@ impl Draws {
         }
     }
 
-    /// Replaces draws by those of a recipe's table.
+    /// Replaces draws by the draws of a recipe's table.
     pub(super) fn with(mut self, table: &toml::Table) -> Result<Self> {
         for (key, value) in table {
             if key == "together" {
@@ -114,7 +114,7 @@ impl Draws {
         Ok(self)
     }
 
-    /// Distributions for scene number `index`: those of all scenes, and those of one table of `together`.
+    /// Distributions for scene number `index`: the common ones, and one table of `together`.
     fn chosen(&self, random: NoiseSource, index: u64) -> BTreeMap<&str, &Distribution> {
         let weight = |i: usize| self.together[i].0;
         let place = random.uniform(stream("together"), index);

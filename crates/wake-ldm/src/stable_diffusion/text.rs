@@ -16,7 +16,7 @@ use wake_nn::linear::linear;
 use wake_nn::weights::{Layout, load};
 use wake_nn::{Error, Result, check_range};
 
-/// Widths and options of a [`ClipText`], by default those of Stable Diffusion v1.4.
+/// Widths and options of a [`ClipText`], by default as in Stable Diffusion v1.4.
 #[derive(Config, Debug, PartialEq)]
 pub struct ClipTextConfig {
     /// Number of tokens in the vocabulary.

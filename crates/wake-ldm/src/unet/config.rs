@@ -8,12 +8,12 @@ use serde_json::{Value, json};
 use crate::options::Options;
 use wake_nn::{Error, Result, check_range};
 
-/// Widths and options of a [`UNet`](super::UNet), by default those of Stable Diffusion v1.4.
+/// Widths and options of a [`UNet`](super::UNet), by default as in Stable Diffusion v1.4.
 ///
 /// Levels are counted from the full size of the latent image down; each level but the last halves it.
 #[derive(Config, Debug, PartialEq)]
 pub struct UNetConfig {
-    /// Channels of the noisy image, plus those of any maps concatenated to it.
+    /// Channels of the noisy image and of any maps concatenated to it.
     #[config(default = 4)]
     pub in_channels: usize,
     /// Channels of the prediction.
@@ -254,7 +254,7 @@ impl UNetConfig {
         }
     }
 
-    /// Whether a level has any attention; the last level has that of the middle block.
+    /// Whether a level has any attention; the middle block's attention counts for the last level.
     fn attends(&self, level: usize) -> bool {
         let levels = self.block_out_channels.len();
         level + 1 == levels || self.down_attention[level] || self.up_attention[levels - 1 - level]

@@ -114,7 +114,7 @@ impl UNet {
 
     /// Predicts the noise, velocity or clean image, whichever the model was trained for.
     ///
-    /// Inputs are cast to the precision of the weights, the result to that of the sample.
+    /// Inputs are cast to the precision of the weights, the result to the precision of the sample.
     ///
     /// # Shapes
     ///

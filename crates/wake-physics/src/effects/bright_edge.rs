@@ -159,7 +159,7 @@ mod tests {
     use super::*;
     use crate::waves::Transfer;
 
-    /// The Bragg part of an edge's response equals that of the hydrodynamic modulation: the slope of the Bragg waves'
+    /// The Bragg part of an edge's response equals the Bragg part of the hydrodynamic modulation: the slope of the Bragg waves'
     /// action spectrum, 4.93, 4.11 and 3.90 at L, C and X band for 5 m/s, 35° and a developed sea, over 0.04 (u*/c)² ω.
     /// With Wu's u* = 0.16771 m/s that rate is, by hand, 0.06041, 0.5020 and 1.0748 1/s.
     #[test]

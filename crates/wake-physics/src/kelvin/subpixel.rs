@@ -14,7 +14,7 @@ use super::{INTERFERENCE, KelvinWake, fade};
 use crate::track::Track;
 use std::f64::consts::{PI, TAU};
 
-/// Largest slope variance of one wave (chosen): that of an amplitude of 0.2 over its wavenumber, as steeper waves break. Smaller
+/// Largest slope variance of one wave (chosen): a wave's with an amplitude of 0.2 over its wavenumber, as steeper waves break. Smaller
 /// variances are not changed, so that waves count the same on pixels that carry them.
 pub(crate) const LARGEST_SLOPE_VARIANCE: f64 = 0.02;
 

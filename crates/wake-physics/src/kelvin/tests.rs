@@ -43,8 +43,8 @@ fn elevations(wake: &KelvinWake, raster: &Raster, places: &[[f64; 2]], tolerance
         .collect()
 }
 
-/// One value is that of Doctors and Beck (1987), Table 1, to within the 1e-3 by which Michell's integral itself differs from it;
-/// all values are those of a second implementation, `tests/reference/ship.py`, to their last digit.
+/// One value stands in Doctors and Beck (1987), Table 1, to within the 1e-3 by which Michell's integral itself differs from it;
+/// a second implementation, `tests/reference/ship.py`, gives all values to their last digit.
 #[test]
 fn wave_resistance_of_the_standard_hull() {
     let hull = Hull::wigley(1.0, 0.1, 0.0625);

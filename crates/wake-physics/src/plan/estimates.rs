@@ -314,7 +314,7 @@ mod tests {
         }
     }
 
-    /// Where a ship's waves roughen the sea, its specular return exceeds that of the sea alone.
+    /// Where a ship's waves roughen the sea, its specular return exceeds the sea's alone.
     #[test]
     fn rough_places_count_where_they_return_more() {
         let keys = [

@@ -367,7 +367,7 @@ mod tests {
         );
     }
 
-    /// Ships share the error budget of the nodes: their bounds add up to that of one ship.
+    /// Ships share the error budget of the nodes: their bounds add up to the bound of one ship.
     #[test]
     fn ships_share_the_tolerance() {
         let one = plan(&["model.terms=all"]);

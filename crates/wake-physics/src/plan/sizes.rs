@@ -10,7 +10,7 @@ const MOST_AT_ONCE: usize = 1 << 25;
 /// Numbers of pixels, waves and nodes of a simulation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Sizes {
-    /// Spacing of the computed pixels \[m\]: that of the image or an integer fraction of it.
+    /// Spacing of the computed pixels \[m\]: the image's spacing or an integer fraction of it.
     pub computed_spacing: f64,
     /// Strips of rows, computed one after the other.
     pub strips: usize,

@@ -51,7 +51,7 @@ impl Advice {
 /// Amounts of work of the stages.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Work {
-    /// Pixels computed, with those of overlapping strips counted repeatedly.
+    /// Pixels computed; pixels of overlapping strips are counted repeatedly.
     pub(crate) computed: f64,
     /// Pixels in memory at once, computed or as sources.
     pub(crate) at_once: f64,

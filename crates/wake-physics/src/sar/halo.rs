@@ -77,7 +77,7 @@ mod tests {
     }
 
     /// The sum over the pixels of a square of half-width h is the cross section minus the part outside, which lies between
-    /// those of the circumscribed and the inscribed ellipse.
+    /// the circumscribed and the inscribed ellipse.
     #[test]
     fn the_halo_has_its_cross_section() {
         let raster = Raster::image(801, 801, 5.0);

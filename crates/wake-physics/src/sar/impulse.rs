@@ -193,7 +193,7 @@ impl ImpulseResponse {
     /// Mean intensity of independent looks, `[rows, columns]` of the image.
     ///
     /// All looks have the same weight except the last, which has less, so that (Σw)²/Σw² is the requested equivalent
-    /// number. Mean, variance and correlation are those of overlapping bands of one aperture.
+    /// number. Mean, variance and correlation are as for overlapping bands of one aperture.
     ///
     /// # Panics
     ///

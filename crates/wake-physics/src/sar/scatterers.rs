@@ -187,7 +187,7 @@ fn uniform(random: &mut impl Rng, [low, high]: [f64; 2]) -> f64 {
 /// Azimuth ambiguities: fainter copies of points, at the same distance ahead and behind.
 ///
 /// - `distance` \[m\], see [`crate::scene::sensor::ambiguity_distance`]
-/// - `level`: cross section of the copies over that of the points \[1\]
+/// - `level`: cross section of the copies over the cross section of the points \[1\]
 ///
 /// Their range shift and smear are neglected.
 #[must_use]

@@ -147,7 +147,7 @@ fn table_of_ship<'t, 'k>(
     Ok((table, rest))
 }
 
-/// Replaces the keys of a serialized scene by those of a scene file.
+/// Replaces the keys of a serialized scene by the keys of a scene file.
 fn with_keys_of_files(text: &str) -> String {
     let (mut out, mut radar) = (String::with_capacity(text.len() + 64), false);
     for line in text.lines() {

@@ -42,7 +42,7 @@ struct GridKeys {
     oversampling: Option<u32>,
 }
 
-/// Keys of the radar, each with the method that replaces an absent value by that of another radar.
+/// Keys of the radar, each with the method that replaces an absent value by another radar's.
 macro_rules! radar_keys {
     ($($(#[$alias:meta])? $key:ident: $type:ty, $or:ident;)*) => {
         #[derive(Debug, Default, Deserialize)]

@@ -216,7 +216,7 @@ mod tests {
             .unwrap()
     }
 
-    /// A few pixels alone equal those of the whole reference image, for a plain scene and one with all extras.
+    /// A few pixels alone equal the same pixels of the whole reference image, for a plain scene and one with all extras.
     #[test]
     fn pixels_are_those_of_the_direct_image() {
         let plain = ["ship.position=[60, 60]", "ship.echo=true"];

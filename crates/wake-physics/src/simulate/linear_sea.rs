@@ -30,7 +30,7 @@ const LEAST_SHARE: f64 = 1e-6;
 /// ```
 ///
 /// - Ψ: wind waves and swell
-/// - ρ' and the derivative of ln σ⁰ are those of the whole sea
+/// - ρ' and the derivative of ln σ⁰ are taken of the whole sea
 /// - T: intensity transfer function of the impulse response, 1 without one
 /// - q: share of the mean intensity that waves modulate; the rest is breaking waves and noise
 ///
@@ -167,7 +167,7 @@ impl LinearSea {
     }
 }
 
-/// Variances of the waves of a square lattice, those of k and −k combined where kx > 0, as their real parts are equivalent.
+/// Variances of the waves of a square lattice, with k and −k combined where kx > 0, as their real parts are equivalent.
 ///
 /// # Shapes
 ///

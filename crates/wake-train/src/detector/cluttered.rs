@@ -17,7 +17,7 @@ use super::sea::{Echoes, border, clutter, filaments, front};
 const FRONTS: f32 = 0.12;
 /// Share of images with filaments.
 const FILAMENTS: f32 = 0.15;
-/// Random numbers of the clutter, apart from those of other draws of the same seed.
+/// Separates the random numbers of the clutter from other draws of the same seed.
 const STREAM: u64 = 0xC1_77E5;
 
 /// Simulated images under painted clutter, which is another at every position, also where an image repeats.

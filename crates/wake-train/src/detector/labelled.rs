@@ -17,7 +17,7 @@ use crate::error::{Error, Result};
 /// Signal-to-noise ratios given to labels that count, and to doubtful ones, around which nothing is learnt.
 const SURE: f32 = 20.0;
 const UNSURE: f32 = 3.0;
-/// Separates the random numbers of the crops from those of other sources with the same seed.
+/// Separates the random numbers of the crops from the random numbers of other sources with the same seed.
 const SQUARES: u64 = 0x1A_BE11;
 
 /// Selection of labelled images to train on.

@@ -125,7 +125,7 @@ fn painted(object: &Object, scene: &Scene) -> Wake {
     }
 }
 
-/// Signal-to-noise ratio of the whole line, from that of a pixel.
+/// Signal-to-noise ratio of the whole line, from a pixel's.
 ///
 /// ```text
 /// snr √(length · width),   both in independent pixels
@@ -136,7 +136,7 @@ fn line_snr(object: &Object, scene: &Scene) -> f32 {
     (snr * (length * LINE).sqrt()) as f32
 }
 
-/// Signal-to-noise ratio of a pixel from that of the line, the inverse of [`line_snr`] for uncorrelated pixels.
+/// Signal-to-noise ratio of a pixel from the line's, the inverse of [`line_snr`] for uncorrelated pixels.
 pub(crate) fn pixel_snr(line: f32, length: f32) -> f64 {
     f64::from(line) / (f64::from(length) * LINE).sqrt()
 }

@@ -62,7 +62,7 @@ impl Speckle {
         field
     }
 
-    /// Multiplies amplitudes by speckle; its skewness is that of a Gamma distribution's root, to first order.
+    /// Multiplies amplitudes by speckle; its skewness equals the skewness of a Gamma variable's square root, to first order.
     pub(crate) fn apply(&self, amplitude: &mut [f32], size: usize, draw: &mut Draw) {
         let normals = self.normals(size, draw);
         let bend = 0.35 * self.spread * self.spread;

@@ -38,7 +38,7 @@ const SIZE: usize = 256;
 const STAGE: &str = "detector";
 /// File that is written: averaged weights.
 const WEIGHTS: &str = "detector.safetensors";
-/// Separates the random numbers of mirroring from those of the image.
+/// Separates the random numbers of mirroring from the random numbers of the image.
 const TURNED: u64 = 0x5151;
 
 /// Task of the detector: maps with hills at tips, lines, directions and extents.

@@ -26,7 +26,7 @@ pub struct ControllabilityRow {
 
 /// Changes a quantity of each scene, draws both scenes, and counts how often the measured value follows.
 ///
-/// The first row is that of the simulator with another sea; the others are those of the model for each of `told`.
+/// The first row is the simulator's with another sea; the others are the model's for each of `told`.
 ///
 /// Values move by a fixed step toward the other end of the paper's range (ship 6 to 12 m/s, wind 3 to 7 m/s, incidence 16 to
 /// 32°), headings by 60°, wind directions by 40°, fetches to three times or a third. Scenes without the ship to be changed do
@@ -79,7 +79,7 @@ pub(super) fn controllability(
 struct Swap {
     quantity: Quantity,
     scenes: [Scene; 2],
-    /// Value of the second scene less that of the first.
+    /// Value of the second scene minus the value of the first.
     change: f64,
 }
 

@@ -18,7 +18,7 @@ use super::wake_correlation::{WakeCorrelation, wake_correlation};
 use crate::error::Result;
 use crate::metrics::Perceptual;
 
-/// First index of the scenes whose values are changed, apart from those of the other figures.
+/// First index of the scenes whose values are changed, apart from the scenes of the other figures.
 const FIRST_CHANGED: u64 = 1 << 20;
 
 /// A source of images to evaluate, and the number of scenes.

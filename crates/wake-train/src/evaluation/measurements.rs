@@ -13,7 +13,7 @@ pub struct MeasurementRow {
     pub quantity: &'static str,
     /// Its unit.
     pub unit: &'static str,
-    /// Errors on simulated images: those of the measurement itself.
+    /// Errors on simulated images: errors of the measurement itself.
     pub simulator: AbsoluteErrors,
     /// Errors on generated images, over the scenes in which the value is measurable on the simulated image; a value that is
     /// not measurable on the generated one is a miss.

@@ -1,4 +1,4 @@
-//! Values measured in an image, against those of its scene.
+//! Values measured in an image, compared with the values of its scene.
 
 use wake_physics::measure::{
     Measured, ShipPlace, angle_between, axis_between, fetch, incidence, measure_wake, open_sea,

@@ -13,7 +13,7 @@ const QUARTER: usize = 4;
 /// Moments of a field beyond its spectrum.
 ///
 /// For a Gaussian field all but [`grouping`](Self::grouping) are 0 up to chance; `grouping` depends on the spectrum alone, so
-/// compare it with that of a Gaussian field of the same spectrum.
+/// compare it with the value of a Gaussian field of the same spectrum.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SeaShape {
     /// Skewness of the values \[1\].

@@ -51,7 +51,7 @@ pub trait ImageSource: Debug {
     /// If an image cannot be drawn. The evaluation refuses images of a wrong number or size.
     fn draw(&self, scenes: &[Scene], told: Told) -> Result<Vec<Field>>;
 
-    /// Whether its images already have speckle, as those of a model trained on speckled images.
+    /// Whether its images already have speckle, as with a model trained on speckled images.
     fn has_speckle(&self) -> bool {
         false
     }
@@ -107,7 +107,7 @@ pub(super) fn drawn(source: &dyn ImageSource, scenes: &[Scene], told: Told) -> R
 /// A source of images, and its name in reports.
 pub type Named<'a> = (&'static str, &'a dyn ImageSource);
 
-/// The same scene with another random sea, that of the seed plus `number`.
+/// The same scene with another random sea, from the seed plus `number`.
 #[must_use]
 pub fn other_sea(scene: &Scene, number: u64) -> Scene {
     Scene {

@@ -11,9 +11,9 @@ use crate::error::Result;
 /// Mapping to grey of all compared images, and whether they are compared with speckle.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct View {
-    /// Mapping from σ⁰ to grey, that of the model's training data.
+    /// Mapping from σ⁰ to grey, as in the model's training data.
     pub grey: GreyScale,
-    /// Whether images have speckle: that of the scene's radar, unless the source draws its own.
+    /// Whether images have speckle: the speckle of the scene's radar, unless the source draws its own.
     pub speckle: bool,
 }
 

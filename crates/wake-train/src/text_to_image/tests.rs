@@ -50,7 +50,7 @@ fn autoencoder(device: &Device) -> AutoencoderKl {
         .init(device)
 }
 
-/// The Laplacian of r² + 3c² is 2 + 6 everywhere, that of a plane 0; small integers are exact in 32 bits.
+/// The Laplacian of r² + 3c² is 2 + 6 everywhere, the Laplacian of a plane 0; small integers are exact in 32 bits.
 #[test]
 fn the_laplacian_of_a_parabola_is_constant() {
     let value = |n: usize| ((n / 7).pow(2) + 3 * (n % 7).pow(2) + 5 * (n / 7)) as f32;

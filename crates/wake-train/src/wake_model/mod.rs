@@ -25,7 +25,7 @@ use wake_ldm::network::{Part, PatchTransform, WakeModelConfig};
 use wake_nn::weights::{Layout, Precision, load, save_as};
 use whole_files::fingerprint;
 
-/// Images of the pairs above those of the model.
+/// Images of the pairs above images of the model.
 const SHEET: &str = "sheet.png";
 /// Images in a row of a sheet.
 const ACROSS: u64 = 8;

@@ -13,7 +13,7 @@ use wake_dataset::{Recipe, Simulated};
 use wake_ldm::conditioning::Vocabulary;
 use wake_ldm::network::{Part, PromptParser};
 
-/// Ranges of the scenes in training prompts, beyond those of images.
+/// Ranges of the scenes in training prompts, wider than the ranges of images.
 const PROMPT_RANGES: [&str; 4] = [
     "draw.ship.speed = [1.0, 15.0]",
     "draw.sea.wind_speed = [1.0, 12.0]",

@@ -50,7 +50,7 @@ const EMPTY: u64 = 900_201;
 const FALSE_ALARMS: f64 = 1.0;
 /// Detections with lower scores are not part of any figure.
 const LEAST_SCORE: f32 = 0.01;
-/// Spacing with which painted images are searched \[m\]; their speckle is that of pixels of ten metres.
+/// Spacing with which painted images are searched \[m\]; their speckle resembles speckle in pixels of ten metres.
 const PAINTED: f32 = 10.0;
 
 /// Writes `detector.calibration.json`, `report.md` and `report.json` into the folder.

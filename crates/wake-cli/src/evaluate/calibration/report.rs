@@ -68,7 +68,7 @@ pub(super) struct Tiles {
     count: usize,
     megapixels: f64,
     check: Check,
-    /// 95 % intervals over the tiles of the calibration error, and of the Brier score minus that of a constant.
+    /// 95 % intervals over the tiles of the calibration error, and of the Brier score minus a constant's Brier score.
     calibration_error: Option<[f64; 2]>,
     brier_less_constant: Option<[f64; 2]>,
     /// Sure detections that are not wakes.

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use crate::options::Options;
 use wake_nn::{Error, Result, check_range};
 
-/// Widths and options of an [`AutoencoderKl`](super::AutoencoderKl), by default those of Stable Diffusion v1.4.
+/// Widths and options of an [`AutoencoderKl`](super::AutoencoderKl), by default as in Stable Diffusion v1.4.
 #[derive(Config, Debug, PartialEq)]
 pub struct AutoencoderKlConfig {
     /// Channels of the input image.
@@ -218,7 +218,7 @@ impl AutoencoderKlConfig {
     }
 }
 
-/// Channels of the image, from those of the first or last convolution.
+/// Channels of the image, from the channels of the first or last convolution.
 fn unpatched(name: &str, channels: usize, patch_size: usize) -> Result<usize> {
     check_range("patch_size", patch_size as f64, 1.0, 64.0)?;
     let patch = patch_size * patch_size;

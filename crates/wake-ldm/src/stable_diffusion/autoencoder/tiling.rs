@@ -5,7 +5,7 @@ use burn::tensor::{Device, Tensor};
 /// Size and overlap of the tiles of an image.
 ///
 /// Neighbouring tiles overlap and are blended linearly. Normalisation and attention act on one tile at
-/// a time, so the result differs slightly from that of the whole image.
+/// a time, so the result differs slightly from the whole image's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tiling {
     /// Rows and columns of a tile in pixels; a multiple of the downsampling.

@@ -29,7 +29,7 @@ pub(super) enum Spread {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SigmaOptions {
     pub(super) spread: Spread,
-    /// Ends of the spread, if they differ from those of the schedule.
+    /// Ends of the spread, if they differ from the ends of the schedule.
     pub(super) min: Option<f64>,
     pub(super) max: Option<f64>,
     /// Shift of a straight path.

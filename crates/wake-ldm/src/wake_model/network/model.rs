@@ -101,7 +101,7 @@ impl WakeModel {
 
     /// Decodes latents to images, grey 0…1, `[batch, 1, rows, columns]`.
     ///
-    /// The difference between the latents and those of the expected image is decoded and added to that image, so that its
+    /// The difference between the latents and the expected image's latents is decoded and added to that image, so that its
     /// finest details, which the latents do not hold, are kept.
     ///
     /// - `image`: the expected image, with the shape of the result, from which `inputs` were computed

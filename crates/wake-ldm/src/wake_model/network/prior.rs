@@ -57,7 +57,7 @@ pub struct Expected {
     pub mean: Tensor<4>,
     /// ln s, `[batch, channels, rows, columns]`.
     pub log_std: Tensor<4>,
-    /// Mean grey of each image minus that of the expected one, `[batch, 1]`.
+    /// Mean grey of each image minus the mean grey of its expected image, `[batch, 1]`.
     pub grey: Tensor<2>,
 }
 

@@ -190,7 +190,7 @@ mod tests {
         assert_eq!(numbers(second), numbers(one));
     }
 
-    /// Correlations of channels 0…5 of a latent pixel with those of the pixels to its right, below it, and below to its right.
+    /// Correlations of channels 0…5 of a latent pixel with the same channels of the pixels to its right, below it, and below to its right.
     fn correlations(images: &[Vec<f32>]) -> Vec<f64> {
         let at = |z: &[f32], c: usize, i: usize, j: usize| f64::from(z[(c * 16 + i) * 16 + j]);
         let mut all = Vec::new();

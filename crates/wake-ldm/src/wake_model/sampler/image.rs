@@ -24,7 +24,7 @@ pub struct SampleSeconds {
 /// Generated image with its scene and labels. Fields are `[rows, columns]`.
 #[derive(Debug, Clone)]
 pub struct WakeImage {
-    /// Grey 0…1 from the model, without speckle except that of a learnt sea.
+    /// Grey 0…1 from the model. Only a learnt sea contains speckle.
     pub grey: Field,
     /// Linear intensity of the same image, in the unit of σ⁰.
     pub intensity: Field,

@@ -107,7 +107,7 @@ impl WakeSampler {
     /// Returns the sampler with a sea learnt from real images, instead of the model's sea and speckle.
     ///
     /// The image is then the expected image of the scene, times a learnt sea of mean 1 with its speckle, plus the echoes of
-    /// the ships, see [`SeaTexture::image`]. Only the prompt parser of the model is used; the steps are those of the learnt sea.
+    /// the ships, see [`SeaTexture::image`]. Only the prompt parser of the model is used; the learnt sea sets the steps.
     /// Labels do not change.
     ///
     /// # Errors
@@ -196,7 +196,7 @@ impl WakeSampler {
 
     /// Samples an image of each scene in one batch on the device, with the labels of the scenes.
     ///
-    /// The images have no speckle except that of a learnt sea.
+    /// Only images of a learnt sea contain speckle.
     ///
     /// # Shapes
     ///

@@ -9,7 +9,7 @@ use super::super::tile::{self, ROWS, WIDE};
 use super::Shape;
 use crate::kernels::zeros;
 
-/// Tokens whose scores are held at a time, a multiple of a tile's rows: the scores of 32 queries take 24 KiB, those of 64
+/// Tokens whose scores are held at a time, a multiple of a tile's rows: the scores of 32 queries take 24 KiB, the scores of 64
 /// queries 48 KiB.
 pub(super) const TOKENS: usize = 32 * ROWS;
 

@@ -123,7 +123,7 @@ impl Layout {
 pub(super) struct Gather {
     taps: Vec<usize>,
     pixels: Vec<usize>,
-    /// Whether all pixels are consecutive, or those of each vector are.
+    /// Whether all pixels, or the pixels of each vector, are consecutive.
     whole: bool,
     halves: bool,
 }

@@ -214,7 +214,7 @@ impl Share<'_> {
         }
     }
 
-    /// Positions from which the rows of a tile read: their channel, shifted by their tap; beyond the last row, those of the last.
+    /// Positions from which the rows of a tile read: their channel, shifted by their tap; beyond the last row, the positions of the last row.
     fn reads(&self, tile: usize) -> [usize; ROWS] {
         let taps = self.geometry.kernel * self.geometry.kernel;
         let last = self.geometry.patch() - 1;

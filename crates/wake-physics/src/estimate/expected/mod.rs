@@ -72,7 +72,7 @@ pub struct Expected {
 /// # Limits
 ///
 /// Ships on straight tracks only, and a sea with wind. Echoes of ships and waves below the pixels ([`Term::SubpixelWake`]) are
-/// left out: these waves change within centimetres, and the derivative at the middle of a pixel is not that of the pixel's mean.
+/// left out: these waves change within centimetres, and the derivative at the middle of a pixel is not the derivative of the pixel's mean.
 #[derive(Debug)]
 pub struct ExpectedImage {
     values: Vec<Value>,

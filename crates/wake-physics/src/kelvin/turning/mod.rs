@@ -15,7 +15,7 @@
 //! ```
 //!
 //! by e^{iz sin φ} = Σ Jₘ(z) e^{imφ} (Jacobi and Anger): one FFT for each k. The only approximation is that strength and phase F̄
-//! of the source are those of the steady wave of length 2π/k. Caustics, where a turn focuses its waves, are therefore right, too.
+//! of the source equal the steady wave's of length 2π/k. Caustics, where a turn focuses its waves, are therefore right, too.
 //!
 //! w rises from bow to stern like the fade of the waves of a straight track. Waves longer than any steady wave are summed with
 //! all others: they are the local rise of water around the hull, and without them the sum over k would end sharply where they
@@ -33,7 +33,7 @@ use rayon::prelude::*;
 use sent::Sent;
 use std::f64::consts::{PI, TAU};
 
-/// Wavenumbers, over that of the longest steady wave, between which the onset becomes sharp (chosen).
+/// Wavenumbers, over the wavenumber of the longest steady wave, between which the onset becomes sharp (chosen).
 const LONG: [f64; 2] = [0.6, 1.0];
 
 /// Largest number of rings that are counted one by one.

@@ -17,7 +17,7 @@ const KNOTS: usize = 12;
 /// the onset stay near the waves of the wake.
 const ONSET: [f64; 2] = [3.0, 10.0];
 
-/// Largest wavelength with a reach and an onset of its own, over that of the longest steady wave in deep water (chosen). A ship
+/// Largest wavelength with a reach and an onset of its own, over the wavelength of the longest steady wave in deep water (chosen). A ship
 /// faster than the waves of a shallow sea has steady waves of any length.
 const LONGEST: f64 = 20.0;
 
@@ -175,7 +175,7 @@ impl Sent {
         self.reaches[knot] + part * (self.reaches[knot + 1] - self.reaches[knot])
     }
 
-    /// Distances run between which the oldest waves k set in \[m\]; longer waves take those of the first knot.
+    /// Distances run between which the oldest waves k set in \[m\]; longer waves take the distances of the first knot.
     pub(super) fn onset(&self, k: f64) -> [f64; 2] {
         let (knot, part) = self.place(k);
         let [before, after] = [self.onsets[knot], self.onsets[knot + 1]];

@@ -7,7 +7,7 @@
 //! detections and what they turned out to be ─► probabilities and their reliability
 //! ```
 //!
-//! The rules and the curves are those of [`score`](wake_detector::score).
+//! [`score`](wake_detector::score) defines the rules and the curves.
 
 mod bootstrap;
 mod compared;

@@ -42,7 +42,7 @@ pub fn feature_groups() -> Vec<FeatureGroup> {
 
 /// The features of a window of levels of 8 bits, in the order of [`feature_groups`].
 ///
-/// None depends on a common factor of the levels, up to rounding; only those of the histogram depend on contrast.
+/// No feature depends on a common factor of the levels, up to rounding; only the histogram's features depend on contrast.
 ///
 /// - `window`: at least 64 rows and columns
 #[must_use]
@@ -246,7 +246,7 @@ fn histogram(window: &Field) -> Vec<f64> {
     ]
 }
 
-/// Correlations of the means of squares, and their deviation over that of a pixel.
+/// Correlations of the means of squares, and their standard deviation over a pixel's.
 fn mottle(window: &Field) -> Vec<f64> {
     let (rows, columns) = (window.rows / SQUARE, window.columns / SQUARE);
     let mean = |n: usize| {
@@ -329,7 +329,7 @@ mod tests {
         }
     }
 
-    /// Correlations of white noise are 0; those of noise smoothed over a few columns follow from the smoothing.
+    /// Correlations of white noise are 0; correlations of noise smoothed over a few columns follow from the smoothing.
     #[test]
     fn lags_are_correlations_along_both_axes() {
         let white = white(3);

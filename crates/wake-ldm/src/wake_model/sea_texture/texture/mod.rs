@@ -24,7 +24,7 @@ const STEPS: usize = 4;
 const MARGIN: usize = 32;
 /// Memory per pixel during sampling \[bytes\]: the network's widest layers, the noise and its transform, rounded up.
 const BYTES_OF_A_PIXEL: u64 = 400;
-/// Largest ratio between the pixel size of a scene and that of the learnt sea (chosen).
+/// Largest ratio between the pixel sizes of a scene and of the learnt sea (chosen).
 const LARGEST_RATIO: f64 = 1.25;
 /// Header entry with the side of a pixel.
 const SPACING: &str = "spacing";
@@ -160,7 +160,7 @@ impl SeaTexture {
         &self.styles
     }
 
-    /// Checks that a pixel size is within a quarter of that of the training images; if theirs is unknown, any size passes.
+    /// Checks that a pixel size is within a quarter of the training images' pixel size. If the latter is unknown, any size passes.
     ///
     /// # Errors
     ///
