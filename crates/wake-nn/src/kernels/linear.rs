@@ -20,6 +20,11 @@ const BLOCK: usize = 8 * ROWS;
 /// numbers, sums are read and written more often than their latency is hidden.
 const DEPTH: usize = 320;
 const COLUMNS: usize = 384;
+/// With at most this many rows, of which [`DEPTH`] numbers fit into an L2 cache, tasks have fewer columns, but not fewer than these.
+const FEW: usize = 800;
+const NARROW: usize = 128;
+/// Multiple of the columns of a tile, at every width of a vector.
+const TILES: usize = 64;
 /// Columns that one core sums at a time.
 const SUMMED: usize = 128;
 
@@ -103,11 +108,21 @@ enum Factor<'a> {
 /// Factors: `[rows, depth]` and `[depth, columns]`; result: `[rows, columns]`
 fn product(left: &[f32], right: Factor<'_>, bias: Option<&[f32]>, sizes: [usize; 3]) -> Vec<f32> {
     let [rows, _, wide] = sizes;
-    // Every task packs its columns again: take as many rows per task as leave four tasks per core.
-    let shares = (4 * rayon::current_num_threads()).div_ceil(wide.div_ceil(COLUMNS));
+    // Every task packs its columns again: take as many rows per task as leave four tasks per core. With few rows, packing takes
+    // a good part of the time: split columns first, and leave two tasks per core.
+    let cores = rayon::current_num_threads();
+    let (wanted, block) = match rows > FEW {
+        true => (4 * cores, COLUMNS),
+        false => {
+            let share = wide / (4 * cores);
+            let block = share - share % TILES;
+            (2 * cores, block.clamp(NARROW, COLUMNS))
+        }
+    };
+    let shares = wanted.div_ceil(wide.div_ceil(block));
     let many = rows.div_ceil(shares).next_multiple_of(BLOCK);
     let mut out = zeros(rows * wide);
-    columns(&mut out, wide, COLUMNS)
+    columns(&mut out, wide, block)
         .par_iter_mut()
         .enumerate()
         .for_each(|(n, out)| {
@@ -117,7 +132,7 @@ fn product(left: &[f32], right: Factor<'_>, bias: Option<&[f32]>, sizes: [usize;
                     right,
                     bias,
                     sizes,
-                    first: [m * many, n * COLUMNS],
+                    first: [m * many, n * block],
                     out,
                 });
             });
@@ -261,6 +276,7 @@ mod tests {
             (97, 385, 64),
             (20, 700, 800),
             (500, 20, 150),
+            (850, 20, 70),
         ] {
             let sizes = Sizes { rows, from, to };
             let (x, weight) = (noise(rows * from, 1), noise(from * to, 2));

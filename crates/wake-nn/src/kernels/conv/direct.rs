@@ -73,12 +73,14 @@ pub(super) fn by_blocks(
         });
 }
 
-/// Pixels per task: few enough to give every core work, many enough to reuse the weights.
+/// Pixels per task: few enough to give every core work, many enough to reuse the weights; two panels, which are multiplied at once,
+/// where there are as many for every core.
 fn block_width(geometry: &Geometry, width: usize) -> usize {
     let panels = geometry.pixels_out().div_ceil(width);
-    let tasks = 4 * rayon::current_num_threads();
-    let share = (panels * geometry.batch).div_ceil(tasks);
-    width * share.clamp(1, PANELS).min(panels)
+    let cores = rayon::current_num_threads();
+    let all = panels * geometry.batch;
+    let least = if all < 2 * cores { 1 } else { 2 };
+    width * all.div_ceil(4 * cores).clamp(least, PANELS).min(panels)
 }
 
 /// Some consecutive pixels of all channels of one image.

@@ -240,7 +240,7 @@ fn rounding_of_weights(x: &[f32], dy: &[f32], g: &Geometry) -> Vec<f64> {
 }
 
 /// Sides that tiles fill and do not fill, unequal borders, channels that are not multiples of a product's rows, panels of
-/// several rows of tiles, several panels per task, more panels than the cache holds, and panels of several small images.
+/// several rows of tiles, several panels per task, more panels or channels than the cache holds, and panels of several small images.
 #[test]
 fn tiles_give_the_sums_that_define_them() {
     let cases = [
@@ -253,6 +253,7 @@ fn tiles_give_the_sums_that_define_them() {
         (32, [17, 16], [7, 9], [1, 1, 1, 1]),
         (85, [16, 16], [4, 6], [1, 0, 1, 2]),
         (1, [16, 16], [2, 1100], [1, 1, 1, 1]),
+        (1, [650, 16], [36, 36], [1, 1, 1, 1]),
     ];
     for (batch, channels, size, border) in cases {
         let g = Geometry {

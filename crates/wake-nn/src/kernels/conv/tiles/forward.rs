@@ -1,5 +1,7 @@
 //! Forward convolution by tiles.
 
+use std::ops::Range;
+
 use pulp::{Simd, WithSimd};
 
 use crate::kernels::arch::arch;
@@ -15,6 +17,8 @@ use crate::kernels::zeros;
 
 /// Numbers of the transformed image that a task keeps in a core's L2 cache: 512 KiB.
 const NEAR: usize = 128 * 1024;
+/// Largest number of channels that are summed at a time, whose two panels of windows stay in the L2 cache.
+const DEPTH: usize = 320;
 
 /// Convolves a batch of images by tiles, with the shapes of [`convolve`](crate::kernels::conv::convolve).
 pub(in crate::kernels::conv) fn convolve(
@@ -153,23 +157,39 @@ impl WithSimd for Block<'_> {
         let rows = (self.y[0].len() / self.columns).div_ceil(2);
         let windows = self.tiles.batch * rows * self.tiles.size_out()[1];
         let panels = windows.div_ceil(width);
-        let panel = PLACES * channels * width;
-        // A row of tiles of a wide image exceeds the cache: transform some panels of it at a time.
-        let together = (NEAR / panel).clamp(2.min(panels), panels);
-        let mut image = vec![0.0; together * panel];
+        // A row of tiles of a wide image exceeds the cache: transform some panels of it at a time, and of many channels a part.
+        let deep = channels.div_ceil(channels.div_ceil(DEPTH));
+        let together = (NEAR / (PLACES * deep * width)).clamp(2.min(panels), panels);
+        let rows = self.tiles.channels[1].div_ceil(ROWS);
+        let mut image = vec![0.0; together * PLACES * deep * width];
+        // Of every panel and six channels: `[row, place, window]`. Sums of a part of the channels wait here for the next part.
+        let waiting = if deep < channels { rows } else { 1 };
+        let mut products = vec![0.0; waiting * together * ROWS * PLACES * width];
         let mut window = vec![0.0; PLACES * width];
         for first in (0..panels).step_by(together) {
-            let image = &mut image[..together.min(panels - first) * panel];
-            for (i, panel) in image.chunks_exact_mut(panel).enumerate() {
-                let begin = self.first + (first + i) * width;
-                let gather = Gather::new::<S>(&self.layout, &self.tiles, begin);
-                for channel in 0..channels {
-                    let planes = &self.planes[channel * self.layout.plane()..];
-                    gather.read::<S>(planes, &mut window);
-                    transform_window(simd, &window, channel, panel);
+            let together = together.min(panels - first);
+            for channel in (0..channels).step_by(deep) {
+                let part = channel..channels.min(channel + deep);
+                let panel = PLACES * part.len() * width;
+                let image = &mut image[..together * panel];
+                for (i, panel) in image.chunks_exact_mut(panel).enumerate() {
+                    let begin = self.first + (first + i) * width;
+                    let gather = Gather::new::<S>(&self.layout, &self.tiles, begin);
+                    for (k, channel) in part.clone().enumerate() {
+                        let planes = &self.planes[channel * self.layout.plane()..];
+                        gather.read::<S>(planes, &mut window);
+                        transform_window(simd, &window, k, panel);
+                    }
+                }
+                let size = together * ROWS * PLACES * width;
+                for row in 0..rows {
+                    let products = &mut products[row % waiting * size..][..size];
+                    self.multiply(simd, image, row * ROWS, part.clone(), products);
+                    if part.end == channels {
+                        self.write(simd, products, row * ROWS, first);
+                    }
                 }
             }
-            self.multiply(simd, image, first);
         }
     }
 }
@@ -206,59 +226,81 @@ fn transform_window<S: Simd>(simd: S, window: &[f32], channel: usize, panel: &mu
 }
 
 impl Block<'_> {
-    /// Multiplies kernels and windows at all sixteen places, from the `first` panel on, and writes the resulting pixels.
+    /// Multiplies six kernels and windows at all sixteen places over a part of the channels; adds to the products of the part before.
+    ///
+    /// - `row`: the first kernel
     #[inline(always)]
-    fn multiply<S: Simd>(&mut self, simd: S, image: &[f32], first: usize) {
+    fn multiply<S: Simd>(
+        &self,
+        simd: S,
+        image: &[f32],
+        row: usize,
+        part: Range<usize>,
+        products: &mut [f32],
+    ) {
         let width = tile::width::<S>();
         let [channels, channels_out] = self.tiles.channels;
-        let panel = PLACES * channels * width;
-        // For every panel: `[row, place, window]`.
-        let mut products = vec![0.0; image.len() / panel * ROWS * PLACES * width];
-        for row in (0..channels_out).step_by(ROWS) {
-            for place in 0..PLACES {
-                let weights = std::array::from_fn(|r| {
-                    let row = place * channels_out + (row + r).min(channels_out - 1);
-                    &self.weight[row * channels..][..channels]
-                });
-                let store = |sums: Sums<S>, products: &mut [f32]| {
-                    let rows = products.chunks_exact_mut(PLACES * width);
-                    for (sum, row) in sums.into_iter().zip(rows) {
-                        tile::store::<S, _>(sum, &mut row[place * width..][..width]);
+        let panel = PLACES * part.len() * width;
+        for place in 0..PLACES {
+            let weights = std::array::from_fn(|r| {
+                let row = place * channels_out + (row + r).min(channels_out - 1);
+                &self.weight[row * channels..][part.clone()]
+            });
+            let start = |products: &[f32]| -> Sums<S> {
+                let mut sums = tile::start(simd, [0.0; ROWS]);
+                if part.start > 0 {
+                    let rows = products.chunks_exact(PLACES * width);
+                    for (sum, row) in sums.iter_mut().zip(rows) {
+                        *sum = tile::load(simd, &row[place * width..][..width]);
                     }
+                }
+                sums
+            };
+            let store = |sums: Sums<S>, products: &mut [f32]| {
+                let rows = products.chunks_exact_mut(PLACES * width);
+                for (sum, row) in sums.into_iter().zip(rows) {
+                    tile::store::<S, _>(sum, &mut row[place * width..][..width]);
+                }
+            };
+            let at_place = place * part.len() * width..(place + 1) * part.len() * width;
+            let panels = image
+                .chunks_exact(panel)
+                .map(|panel| &panel[at_place.clone()]);
+            let mut both = panels.zip(products.chunks_exact_mut(ROWS * PLACES * width));
+            while let Some((panel, product)) = both.next() {
+                let mut sums = start(product);
+                let next = match S::REGISTER_COUNT {
+                    32.. => both.next(),
+                    _ => None,
                 };
-                let at_place = place * channels * width..(place + 1) * channels * width;
-                let panels = image
-                    .chunks_exact(panel)
-                    .map(|panel| &panel[at_place.clone()]);
-                let mut both = panels.zip(products.chunks_exact_mut(ROWS * PLACES * width));
-                while let Some((panel, product)) = both.next() {
-                    let mut sums = tile::start(simd, [0.0; ROWS]);
-                    let next = match S::REGISTER_COUNT {
-                        32.. => both.next(),
-                        _ => None,
-                    };
-                    if let Some((next, product)) = next {
-                        let mut others = sums;
-                        let both = [&mut sums, &mut others];
-                        tile::multiply_two(simd, weights, [panel, next], both);
-                        store(others, product);
-                    } else {
-                        tile::multiply(simd, weights, 0, panel, &mut sums);
-                    }
-                    store(sums, product);
+                if let Some((next, product)) = next {
+                    let mut others = start(product);
+                    let both = [&mut sums, &mut others];
+                    tile::multiply_two(simd, weights, [panel, next], both);
+                    store(others, product);
+                } else {
+                    tile::multiply(simd, weights, 0, panel, &mut sums);
                 }
+                store(sums, product);
             }
-            for (i, products) in products.chunks_exact(ROWS * PLACES * width).enumerate() {
-                let channels = row..channels_out.min(row + ROWS);
-                for (channel, products) in channels.zip(products.chunks_exact(PLACES * width)) {
-                    let bias = self.bias.map_or(0.0, |bias| bias[channel]);
-                    let tiles = Run {
-                        first: (first + i) * width,
-                        columns: self.columns,
-                        images: channels_out,
-                    };
-                    tiles.write(simd, products, bias, &mut self.y[channel..]);
-                }
+        }
+    }
+
+    /// Writes the pixels of six kernels, beginning at `row`, from the `first` panel on.
+    #[inline(always)]
+    fn write<S: Simd>(&mut self, simd: S, products: &[f32], row: usize, first: usize) {
+        let width = tile::width::<S>();
+        let channels_out = self.tiles.channels[1];
+        for (i, products) in products.chunks_exact(ROWS * PLACES * width).enumerate() {
+            let channels = row..channels_out.min(row + ROWS);
+            for (channel, products) in channels.zip(products.chunks_exact(PLACES * width)) {
+                let bias = self.bias.map_or(0.0, |bias| bias[channel]);
+                let tiles = Run {
+                    first: (first + i) * width,
+                    columns: self.columns,
+                    images: channels_out,
+                };
+                tiles.write(simd, products, bias, &mut self.y[channel..]);
             }
         }
     }
