@@ -11,7 +11,7 @@
 //! z is the contrast in standard deviations of the speckle. m is the mean of s on the first part, and a share of it beyond,
 //! because wakes fade. The profile is smoothed, shrunk toward zero where it does not exceed its noise, and has mean zero, so
 //! that mottle as wide as the strip cancels; on the first part, each block is compared with the profile of the others. The
-//! length is the posterior mean over n, the shares of m and small turns of the axis; its standard deviation is the standard deviation of the
+//! length is the posterior mean over n, the shares of m and small turns of the axis; its standard deviation comes from the
 //! posterior, plus a share of the length for wakes that fade.
 //!
 //! # References

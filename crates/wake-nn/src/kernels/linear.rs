@@ -20,10 +20,11 @@ const BLOCK: usize = 8 * ROWS;
 /// numbers, sums are read and written more often than their latency is hidden.
 const DEPTH: usize = 320;
 const COLUMNS: usize = 384;
-/// With at most this many rows, of which [`DEPTH`] numbers fit into an L2 cache, tasks have fewer columns, but not fewer than these.
+/// Largest number of rows for which the work is split by columns first: [`DEPTH`] numbers of each row fit into an L2 cache.
 const FEW: usize = 800;
+/// Least number of columns per task with few rows.
 const NARROW: usize = 128;
-/// Multiple of the columns of a tile, at every width of a vector.
+/// Columns of a task are a multiple of this number, and so of the columns of a tile on every machine.
 const TILES: usize = 64;
 /// Columns that one core sums at a time.
 const SUMMED: usize = 128;
@@ -276,7 +277,7 @@ mod tests {
             (97, 385, 64),
             (20, 700, 800),
             (500, 20, 150),
-            (850, 20, 70),
+            (850, 20, 400),
         ] {
             let sizes = Sizes { rows, from, to };
             let (x, weight) = (noise(rows * from, 1), noise(from * to, 2));

@@ -51,7 +51,7 @@ pub trait ImageSource: Debug {
     /// If an image cannot be drawn. The evaluation refuses images of a wrong number or size.
     fn draw(&self, scenes: &[Scene], told: Told) -> Result<Vec<Field>>;
 
-    /// Whether its images already have speckle, as with a model trained on speckled images.
+    /// `true` for sources of speckled images, such as a model trained on speckled images.
     fn has_speckle(&self) -> bool {
         false
     }

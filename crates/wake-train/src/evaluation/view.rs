@@ -13,7 +13,7 @@ use crate::error::Result;
 pub struct View {
     /// Mapping from σ⁰ to grey, as in the model's training data.
     pub grey: GreyScale,
-    /// Whether images have speckle: the speckle of the scene's radar, unless the source draws its own.
+    /// Images with speckle: the source's own, otherwise speckle of the scene's radar.
     pub speckle: bool,
 }
 

@@ -18,7 +18,7 @@ pub(super) struct DdimConfig {
     steps: Steps,
     prediction: Prediction,
     clipping: Clipping,
-    /// Whether ᾱ is 1 after the last step; otherwise ᾱ of the first training step is used.
+    /// ᾱ after the last step: 1 if `true`, ᾱ of the first training step if `false`.
     end_at_one: bool,
     eta: f64,
     /// Whether the noise is computed from the clipped clean image instead of the prediction.

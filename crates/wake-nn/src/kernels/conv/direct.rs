@@ -73,8 +73,8 @@ pub(super) fn by_blocks(
         });
 }
 
-/// Pixels per task: few enough to give every core work, many enough to reuse the weights; two panels, which are multiplied at once,
-/// where there are as many for every core.
+/// Pixels per task: few enough to give every core work, many enough to reuse the weights. Two panels are multiplied at once, so a task
+/// has at least two if there are two panels per core.
 fn block_width(geometry: &Geometry, width: usize) -> usize {
     let panels = geometry.pixels_out().div_ceil(width);
     let cores = rayon::current_num_threads();

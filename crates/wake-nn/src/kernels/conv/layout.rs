@@ -123,8 +123,9 @@ impl Layout {
 pub(super) struct Gather {
     taps: Vec<usize>,
     pixels: Vec<usize>,
-    /// Whether all pixels, or the pixels of each vector, are consecutive.
+    /// All pixels are consecutive.
     whole: bool,
+    /// The pixels of each vector are consecutive.
     halves: bool,
 }
 
