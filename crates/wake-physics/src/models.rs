@@ -12,7 +12,6 @@ use crate::scattering::{Backscatter, SlopeCovariance, Specular, TwoScale, bragg}
 use crate::scene::{HullForm, Radar, Scene, Ship, Term};
 use crate::spectrum::elfouhaily::{DragLaw, Elfouhaily, friction_velocity};
 use crate::swell::Swell;
-use crate::track::Track;
 use crate::waves::Transfer;
 use crate::wind_sea::{DirectionalSpectrum, WindSea};
 use crate::window::Window;
@@ -21,9 +20,6 @@ use std::f64::consts::{PI, SQRT_2, TAU};
 
 /// Block coefficient of the full hull if the scene gives none: a laden tanker.
 const TANKER_BLOCK_COEFFICIENT: f64 = 0.8;
-
-/// Largest coordinate of a ship \[m\]; larger ones overflow in squares and areas. No image reaches so far.
-const FARTHEST: f64 = 1e100;
 
 /// The models of a valid scene.
 #[derive(Debug, Clone)]
@@ -243,12 +239,7 @@ pub(crate) fn kelvin_wake(ship: &Ship, depth: f64, time: f64) -> KelvinWake {
             }
         },
         speed: ship.speed,
-        track: Track::turning(
-            ship.position.map(|at| at.clamp(-FARTHEST, FARTHEST)),
-            ship.heading,
-            ship.speed * time,
-            ship.curvature(),
-        ),
+        track: ship.track(time),
         depth,
         filter_depth: ship.filter_depth,
         steepness: ship.steepness,

@@ -9,6 +9,7 @@ pub(crate) mod paper;
 mod polarization;
 pub mod sensor;
 
+use crate::track::Track;
 use crate::window::Window;
 pub use keys::stored_key;
 pub use model::{Model, Term, TermRule, Terms};
@@ -279,7 +280,18 @@ impl Default for Ship {
     }
 }
 
+/// Largest coordinate of a ship \[m\]. No image reaches so far.
+const FARTHEST: f64 = 1e100;
+
 impl Ship {
+    /// Place and direction at a time \[s\], and the curve of the track. Coordinates of more than 10¹⁰⁰ m count as 10¹⁰⁰ m.
+    #[must_use]
+    pub fn track(&self, time: f64) -> Track {
+        // Larger coordinates overflow in squares and areas.
+        let start = self.position.map(|at| at.clamp(-FARTHEST, FARTHEST));
+        Track::turning(start, self.heading, self.speed * time, self.curvature())
+    }
+
     /// Curvature of the ship's track [1/m], positive to starboard; 0 on a straight track.
     pub(crate) fn curvature(&self) -> f64 {
         if self.turn_rate == 0.0 {

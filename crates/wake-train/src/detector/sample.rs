@@ -23,7 +23,9 @@ pub struct Sample {
 const LINE: f64 = 16.0;
 /// Length, in independent pixels, and signal-to-noise ratio assumed for a ship's wake without a label: between wakes that count and open
 /// sea, so that it is ignored.
-const UNSURE: (f32, f32) = (80.0, 3.0);
+const UNSURE: (f64, f32) = (80.0, 3.0);
+/// Largest turn of a ship over half of its wake's line \[rad\] (chosen).
+const CHORD: f64 = 1.0;
 
 impl Sample {
     /// Sample of a pair with a square image.
@@ -75,7 +77,8 @@ impl Sample {
 
 /// The wakes of a scene: those with labels, and uncertain ones of all other ships under way.
 ///
-/// A wake's line begins at the stern. A scene without ships belongs to a painted image, whose wakes are the objects alone.
+/// A wake's line begins at the stern. Behind a turning ship, its axis is the chord to the middle of the visible line, at most
+/// [`CHORD`] of the turn away. A scene without ships belongs to a painted image, whose wakes are the objects alone.
 pub(crate) fn wakes(objects: &[Object], scene: &Scene) -> Vec<Wake> {
     let mut seen: Vec<&Object> = objects.iter().filter(|o| o.class == Class::Wake).collect();
     let grid = &scene.grid;
@@ -84,31 +87,41 @@ pub(crate) fn wakes(objects: &[Object], scene: &Scene) -> Vec<Wake> {
     let pixel = |[x, y]: [f64; 2]| [middle[0] + x / grid.spacing, middle[1] - y / grid.spacing];
     let mut wakes = Vec::new();
     for ship in scene.ships.iter().filter(|ship| ship.speed > 0.0) {
-        let axis = (ship.heading + 180.0).rem_euclid(360.0);
-        let astern = [axis.to_radians().sin(), axis.to_radians().cos()];
-        let stern = [0, 1].map(|a| ship.position[a] + 0.5 * ship.length * astern[a]);
+        let track = ship.track(scene.sea.time);
+        let astern = heading(track.forward.map(|x| -x));
         let hull = ship.length / grid.spacing;
-        let label = seen.iter().position(|o| (o.axis_deg - axis).abs() < 1e-9);
+        let label = seen.iter().position(|o| turn(o.axis_deg, astern) < 1e-6);
         let object = label.map(|at| seen.swap_remove(at));
         let half_angle = object.map_or(0.0, |o| o.half_angle_deg);
         let (length, snr) = match object {
-            Some(object) => (
-                (object.length_px - hull).max(LINE) as f32,
-                line_snr(object, scene),
-            ),
-            None => (UNSURE.0 * independent_pixel(scene) as f32, UNSURE.1),
+            Some(object) => ((object.length_px - hull).max(LINE), line_snr(object, scene)),
+            None => (UNSURE.0 * independent_pixel(scene), UNSURE.1),
         };
+        let stern = track.at(-0.5 * ship.length);
+        let half = 0.5 * length * grid.spacing;
+        let there = stern.at(-half.min(CHORD / stern.curvature.abs())).position;
+        let axis = heading([0, 1].map(|a| there[a] - stern.position[a]));
         wakes.push(Wake {
-            tip: pixel(stern).map(|x| x as f32),
+            tip: pixel(stern.position).map(|x| x as f32),
             axis_deg: axis as f32,
             half_angle_deg: half_angle as f32,
-            length,
+            length: length as f32,
             snr,
             contrast_db: object.and_then(|o| Some(o.visibility?.contrast_db as f32)),
         });
     }
     wakes.extend(seen.into_iter().map(|object| painted(object, scene)));
     wakes
+}
+
+/// Direction of a vector (x, y) [deg clockwise from +y], 0 up to 360.
+fn heading([x, y]: [f64; 2]) -> f64 {
+    x.atan2(y).to_degrees().rem_euclid(360.0)
+}
+
+/// Angle between two directions \[deg\], 0 to 180.
+fn turn(a: f64, b: f64) -> f64 {
+    ((a - b + 180.0).rem_euclid(360.0) - 180.0).abs()
 }
 
 /// Wake without a ship in the scene; its box begins at its tip.
@@ -204,7 +217,7 @@ mod tests {
         assert!(wake.contrast_db.is_some_and(|db| db > 0.1));
         let unseen = wakes(&[], &scene)[0];
         assert_eq!((unseen.tip, unseen.axis_deg), (wake.tip, wake.axis_deg));
-        assert_eq!((unseen.length, unseen.snr), UNSURE);
+        assert_eq!((f64::from(unseen.length), unseen.snr), UNSURE);
         let object = wake_physics::labels_of(&scene).objects()[0];
         let mut correlated = scene.clone();
         correlated.radar.range_resolution = Some(40.0);
@@ -223,5 +236,63 @@ mod tests {
         assert!((ratio - 1.0).abs() < 1e-6, "{ratio}");
         let longer = wakes(&[], &finer)[0].length / wakes(&[], &correlated)[0].length;
         assert!((longer - 2.0).abs() < 1e-6, "{longer}");
+    }
+    /// A ship is followed back along its circle in small steps, from its place after a while: its wake begins at the stern, and
+    /// its axis passes where the line is half as long, or where the ship has turned by the largest angle.
+    #[test]
+    fn the_axis_behind_a_turning_ship_is_a_chord() {
+        for (rate, speed, half_m) in [(0.05, 8.0, 400.0), (-0.1, 6.0, 400.0), (1.0, 5.0, 286.479)] {
+            let (start, heading, time) = ([30.0, 40.0], 70.0, 20.0);
+            let changes = [
+                format!("ship.speed={speed}"),
+                format!("ship.turn_rate={rate}"),
+                format!("ship.heading={heading}"),
+                "ship.position=[30, 40]".to_owned(),
+                "ship.length=90".to_owned(),
+                format!("sea.time={time}"),
+                "radar.range_resolution=10".to_owned(),
+                "radar.azimuth_resolution=10".to_owned(),
+                "grid.spacing=10".to_owned(),
+            ];
+            let scene = Scene::default()
+                .with_assignments(&changes)
+                .expect("a scene");
+            let walked = |seconds: f64| {
+                const STEPS: usize = 1000;
+                let step = seconds / STEPS as f64;
+                (0..STEPS).fold(start, |[x, y]: [f64; 2], k| {
+                    let along = f64::to_radians(heading + rate * (k as f64 + 0.5) * step);
+                    [
+                        x + speed * step * along.sin(),
+                        y + speed * step * along.cos(),
+                    ]
+                })
+            };
+            let [wake] = wakes(&[], &scene)[..] else {
+                panic!("one wake");
+            };
+            assert!(
+                (f64::from(wake.length) - 80.0).abs() < 1e-4,
+                "{}",
+                wake.length
+            );
+            let pixel = |[x, y]: [f64; 2]| [256.0 + x / 10.0, 256.0 - y / 10.0];
+            let stern = pixel(walked(time - 45.0 / speed));
+            let there = pixel(walked(time - (45.0 + half_m) / speed));
+            for axis in 0..2 {
+                assert!(
+                    (f64::from(wake.tip[axis]) - stern[axis]).abs() < 1e-3,
+                    "{wake:?}"
+                );
+            }
+            let chord = (there[0] - stern[0]).hypot(there[1] - stern[1]);
+            let reached = wake.at(chord as f32);
+            for axis in 0..2 {
+                assert!(
+                    (f64::from(reached[axis]) - there[axis]).abs() < 0.02,
+                    "{rate} {wake:?}"
+                );
+            }
+        }
     }
 }
