@@ -237,8 +237,10 @@ mod tests {
         let longer = wakes(&[], &finer)[0].length / wakes(&[], &correlated)[0].length;
         assert!((longer - 2.0).abs() < 1e-6, "{longer}");
     }
+
     /// A ship is followed back along its circle in small steps, from its place after a while: its wake begins at the stern, and
-    /// its axis passes where the line is half as long, or where the ship has turned by the largest angle.
+    /// its axis passes where the line is half as long, or where the ship has turned by the largest angle. A label is found by the
+    /// direction at the ship.
     #[test]
     fn the_axis_behind_a_turning_ship_is_a_chord() {
         for (rate, speed, half_m) in [(0.05, 8.0, 400.0), (-0.1, 6.0, 400.0), (1.0, 5.0, 286.479)] {
@@ -249,6 +251,7 @@ mod tests {
                 format!("ship.heading={heading}"),
                 "ship.position=[30, 40]".to_owned(),
                 "ship.length=90".to_owned(),
+                "radar.looks=50".to_owned(),
                 format!("sea.time={time}"),
                 "radar.range_resolution=10".to_owned(),
                 "radar.azimuth_resolution=10".to_owned(),
@@ -257,6 +260,9 @@ mod tests {
             let scene = Scene::default()
                 .with_assignments(&changes)
                 .expect("a scene");
+            let objects = wake_physics::labels_of(&scene).objects();
+            assert!(objects.iter().any(|one| one.class == Class::Wake));
+            assert_eq!(wakes(&objects, &scene).len(), 1, "{objects:?}");
             let walked = |seconds: f64| {
                 const STEPS: usize = 1000;
                 let step = seconds / STEPS as f64;
