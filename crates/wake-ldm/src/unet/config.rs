@@ -254,7 +254,7 @@ impl UNetConfig {
         }
     }
 
-    /// Whether a level has any attention. The last level always has: the middle block.
+    /// `true` for levels with attention; the last level always has some, in the middle block.
     fn attends(&self, level: usize) -> bool {
         let levels = self.block_out_channels.len();
         level + 1 == levels || self.down_attention[level] || self.up_attention[levels - 1 - level]
