@@ -3,6 +3,7 @@
 use wake_dataset::Pair;
 use wake_physics::Scene;
 use wake_physics::labels::{Class, Object, independent_pixel};
+use wake_physics::measure::angle_between;
 
 use super::draw::Draw;
 use wake_detector::GreyImage;
@@ -90,7 +91,9 @@ pub(crate) fn wakes(objects: &[Object], scene: &Scene) -> Vec<Wake> {
         let track = ship.track(scene.sea.time);
         let astern = heading(track.forward.map(|x| -x));
         let hull = ship.length / grid.spacing;
-        let label = seen.iter().position(|o| turn(o.axis_deg, astern) < 1e-6);
+        let label = seen
+            .iter()
+            .position(|o| angle_between(o.axis_deg, astern).abs() < 1e-6);
         let object = label.map(|at| seen.swap_remove(at));
         let half_angle = object.map_or(0.0, |o| o.half_angle_deg);
         let (length, snr) = match object {
@@ -117,11 +120,6 @@ pub(crate) fn wakes(objects: &[Object], scene: &Scene) -> Vec<Wake> {
 /// Direction of a vector (x, y) [deg clockwise from +y], 0 up to 360.
 fn heading([x, y]: [f64; 2]) -> f64 {
     x.atan2(y).to_degrees().rem_euclid(360.0)
-}
-
-/// Angle between two directions \[deg\], 0 to 180.
-fn turn(a: f64, b: f64) -> f64 {
-    ((a - b + 180.0).rem_euclid(360.0) - 180.0).abs()
 }
 
 /// Wake without a ship in the scene; its box begins at its tip.
