@@ -1,15 +1,15 @@
 """Trains the small text-to-image model of `wake train text-to-image` in PyTorch, on a GPU.
 
-    wake train text-to-image --count 8 --steps 1 --autoencoder-steps 1 --downsampling 8 --latents 16 --out MODEL
     wake dataset --grid crates/wake-cli/src/train/text_to_image.toml --count 40000 --val-share 0 --out DATA
-    python benches/torch_text_to_image.py autoencoder MODEL DATA
-    python benches/torch_text_to_image.py model MODEL DATA --samples 80000,250000,500000,1000000
+    wake train text-to-image --data DATA --steps 1 --out MODEL
+    python benches/torch_text_to_image.py MODEL DATA --samples 80000,250000,500000,1000000
     wake evaluate pipeline --weights MODEL-1000000 --count 60
 
-Needs torch, diffusers, transformers, pillow. Shapes are those of MODEL, a folder that the first command wrote; first weights are random.
-Losses, optimizer, averages and schedule are those of `wake train text-to-image`, the batch is larger. Convolutions of burn's backends
-for GPUs take many times as long as torch's (docs/reports/performance.md), and a million images take minutes here instead of hours.
-`model` writes one folder for each number of images seen, which `wake` reads like MODEL itself, and goes on where it was stopped.
+Needs torch, diffusers, transformers, pillow. The second command fits the autoencoder and trains the text encoder alone; the U-Net begins
+with random weights. Loss, optimizer, averages and schedule are those of `wake train text-to-image`, the batch is larger. Convolutions
+of burn's backends for GPUs take many times as long as torch's (docs/reports/performance.md), and a million images take minutes here
+instead of hours. It writes one folder for each number of images seen, which `wake` reads like MODEL itself, and goes on where it was
+stopped.
 """
 
 import argparse
@@ -24,12 +24,11 @@ from pathlib import Path
 import numpy as np
 import torch
 import torch.nn.functional as F
-from diffusers import AutoencoderKL, UNet2DConditionModel
+from diffusers import UNet2DConditionModel
 from PIL import Image
 from safetensors.torch import load_file, save_file
 from transformers import CLIPTextConfig, CLIPTextModel, CLIPTokenizer
 
-CROP, CURVATURE, DIVERGENCE, PATCH = 128, 1.0, 1e-5, 4
 WARMUP, DECAY, LEFT_OUT, EAGER, HELD_OUT = 100, 0.999, 0.1, 3, 64
 VAE = "vae/diffusion_pytorch_model.safetensors"
 UNET = "unet/diffusion_pytorch_model.safetensors"
@@ -50,22 +49,6 @@ def images(folder, count, device):
 
 def scaled(pixels):
     return pixels.float() / 127.5 - 1
-
-
-def autoencoder(folder):
-    """An autoencoder as a folder describes it; `diffusers` knows it without the rearrangement of 4 × 4 pixels into channels."""
-    config = json.loads((folder / "vae/config.json").read_text())
-    assert config.pop("patch_size") == PATCH
-    return AutoencoderKL.from_config(config)
-
-
-def posterior(vae, pixels):
-    """Posterior of images scaled to −1…1."""
-    return vae.encode(F.pixel_unshuffle(pixels, PATCH)).latent_dist
-
-
-def decoded(vae, latents):
-    return F.pixel_shuffle(vae.decode(latents).sample, PATCH)
 
 
 class Learning:
@@ -160,91 +143,50 @@ def halves(tensors):
     return {name: value.to(torch.float16).contiguous() for name, value in tensors.items()}
 
 
-def power(images):
-    """Mean power of the rings of round wave numbers up to half the Nyquist frequency [dB], mean over images."""
-    side = images.shape[-1]
-    spectrum = torch.fft.fft2(images[:, 0].double()).abs().square() / side**2
-    k = torch.fft.fftfreq(side, 1 / side).to(images.device)
-    ring = torch.hypot(k[:, None], k[None, :]).round().long()
-    rings = [spectrum[:, ring == n].mean(1).clamp_min(1e-6).log10() * 10 for n in range(1, side // 4 + 1)]
-    return torch.stack(rings).mean(1)
+def encoded(folder, pixels):
+    """Latents of all images by the linear autoencoder of a folder."""
+    config = json.loads((folder / "vae/config.json").read_text())
+    assert not config["block_out_channels"], "a convolutional autoencoder"
+    channels = config["latent_channels"]
+    layer = load_file(folder / VAE)
+    weight, bias = (layer[f"quant_conv.{name}"][:channels].float().to(pixels.device) for name in ("weight", "bias"))
+    squares = (F.pixel_unshuffle(scaled(part), config["patch_size"]) for part in pixels.split(64))
+    return torch.cat([F.conv2d(part, weight, bias).half() for part in squares])
 
 
-def train_autoencoder(options, device):
-    pixels, _ = images(options.data, options.images + HELD_OUT, device)
-    held_out, pixels = pixels[:HELD_OUT], pixels[HELD_OUT:]
-    vae = autoencoder(options.model).to(device)
-    room = pixels.shape[-1] - CROP + 1
-    whole = torch.arange(CROP, device=device)
-    laplacian = torch.tensor([[0.0, 1, 0], [1, -4, 1], [0, 1, 0]], device=device)[None, None]
-
-    def loss():
-        which = torch.randint(pixels.shape[0], (options.batch,), device=device)
-        corner = torch.randint(room, (2, options.batch), device=device)
-        rows, columns = (corner[axis][:, None] + whole for axis in range(2))
-        crop = scaled(pixels[which[:, None, None], 0, rows[:, :, None], columns[:, None, :]])[:, None]
-        z = posterior(vae, crop)
-        divergence = 0.5 * (z.mean.square() + z.var - 1 - z.logvar).mean()
-        error = decoded(vae, z.mean + z.std * torch.randn_like(z.mean)) - crop
-        curved = F.conv2d(error, laplacian)
-        return error.square().mean() + CURVATURE * curved.square().mean() + DIVERGENCE * divergence
-
-    learning = Learning([vae], loss, options.steps, options)
-    report(learning, options.steps, math.inf)
-    vae.load_state_dict(learning.averaged()[0])
-    with torch.no_grad():
-        truth = scaled(held_out)
-        found = torch.cat([decoded(vae, posterior(vae, part).mode()) for part in truth.split(16)])
-    error = (found - truth).square().mean(dim=(1, 2, 3)) / 4
-    curve = power(found / 2) - power(truth / 2)
-    print("dB at rings 8, 16, …: ", [round(float(db), 1) for db in curve[7::8]])
-    print(f"autoencoder {options.model.name}: PSNR {-10 * error.log10().mean():.2f} dB, spectrum within {curve.abs().max():.2f} dB", flush=True)
-    save_file(halves(learning.averaged()[0]), options.model / VAE)
-
-
-def encoded(vae, pixels):
-    """Latents of all images, with mean 0 and variance 1 together, their mean and their scale."""
-    with torch.no_grad():
-        parts = [posterior(vae, scaled(part)).mode().half() for part in pixels.split(64)]
-    latents = torch.cat(parts)
-    mean = torch.stack([part.double().mean() for part in latents.split(1000)]).mean()
-    square = torch.stack([(part.double() - mean).square().mean() for part in latents.split(1000)]).mean()
-    scale = square.rsqrt()
-    return ((latents.float() - mean.float()) * scale.float()).half(), float(mean), float(scale)
-
-
-def train_model(options, device):
+def train(options, device):
     pixels, prompts = images(options.data, options.images, device)
-    vae = autoencoder(options.model)
-    vae.load_state_dict({name: value.float() for name, value in load_file(options.model / VAE).items()})
-    latents, mean, scale = encoded(vae.to(device), pixels)
-    del pixels, vae
-    print(f"latents {list(latents.shape)}, mean {mean:.4f}, scale {scale:.4f}", flush=True)
+    latents = encoded(options.model, pixels)
+    del pixels
+    print(f"latents {list(latents.shape)}, mean {latents.float().mean():.4f}, variance {latents.float().var():.4f}", flush=True)
     tokenizer = CLIPTokenizer.from_pretrained(options.model / "tokenizer")
     ids = tokenizer(prompts + [""], padding="max_length", max_length=77, truncation=True, return_tensors="pt").input_ids.to(device)
     unet = UNet2DConditionModel.from_config(json.loads((options.model / "unet/config.json").read_text()))
     text = CLIPTextModel(CLIPTextConfig.from_json_file(options.model / "text_encoder/config.json"))
+    if not options.random_text:
+        weights = {name.removeprefix("text_model."): value.float() for name, value in load_file(options.model / TEXT).items()}
+        own = [name for name, _ in text.named_parameters()]
+        text.load_state_dict({name: weights[name.removeprefix("text_model.")] for name in own}, strict=False)
     unet, text = unet.to(device).train(), text.to(device).train()
     schedule = json.loads((options.model / "scheduler/scheduler_config.json").read_text())
-    velocity = options.predict == "velocity"
-    changes = {
-        "vae/config.json": {"scaling_factor": scale, "shift_factor": mean},
-        "scheduler/scheduler_config.json": {"prediction_type": "v_prediction" if velocity else "epsilon"},
-    }
+    assert schedule["prediction_type"] == "v_prediction" and schedule["rescale_betas_zero_snr"]
     betas = torch.linspace(schedule["beta_start"] ** 0.5, schedule["beta_end"] ** 0.5, 1000, dtype=torch.float64) ** 2
-    kept = torch.cumprod(1 - betas, 0).float().to(device)
+    root = torch.cumprod(1 - betas, 0).sqrt()
+    kept = ((root - root[-1]) * root[0] / (root[0] - root[-1])).square().float().to(device)
     count = latents.shape[0] - HELD_OUT
 
     def noised(clean, noise, level):
         """Input of the U-Net and its target."""
         signal, spread = level.sqrt(), (1 - level).sqrt()
-        return signal * clean + spread * noise, signal * noise - spread * clean if velocity else noise
+        return signal * clean + spread * noise, signal * noise - spread * clean
 
     def loss():
         which = torch.randint(count, (options.batch,), device=device)
         left_out = torch.rand(options.batch, device=device) < LEFT_OUT
         told = ids[torch.where(left_out, count + HELD_OUT, which)]
         t = torch.randint(1000, (options.batch,), device=device)
+        if not options.uniform:
+            t[1::2] = 900 + t[1::2] // 10
         clean = latents[which].float()
         noise = torch.randn_like(clean)
         sample, target = noised(clean, noise, kept[t][:, None, None, None])
@@ -258,11 +200,11 @@ def train_model(options, device):
         clean = latents[count:].float()
         noise = torch.randn(clean.shape, generator=random, device=device)
         shares = []
-        for step in (500, 800, 900, 950, 990):
+        for step in (500, 800, 900, 950, 990, 999):
             level = kept[step]
             sample, target = noised(clean, noise, level)
             found = unet(sample, torch.full((HELD_OUT,), step, device=device), text(prompts).last_hidden_state).sample
-            error = (found - target).square().mean() * (1 - level) / (1 if velocity else level)
+            error = (found - target).square().mean() * (1 - level)
             shares.append(f"{step}: {float(error / clean.var()):.3f}")
         return ", ".join(shares)
 
@@ -271,7 +213,6 @@ def train_model(options, device):
     checkpoint = options.model / "torch.pt"
     if checkpoint.exists():
         state = torch.load(checkpoint, map_location=device, weights_only=True)
-        assert state["predict"] == options.predict, "a run of another prediction"
         learning.resume(state)
         torch.manual_seed(options.seed + learning.done)
     begin = time.monotonic()
@@ -282,24 +223,21 @@ def train_model(options, device):
         report(learning, mark // options.batch, left)
         if learning.done < mark // options.batch:
             break
-        write(options.model, mark, learning, changes)
+        write(options.model, mark, learning)
         with torch.no_grad(), learning.averages_in_place():
             told = ids[count:-1]
             print(f"left open, by step, told the prompt: {unexplained(told)}")
             print(f"left open, by step, told another:    {unexplained(told.roll(7, 0))}", flush=True)
-    torch.save({**learning.state(), "predict": options.predict}, checkpoint)
+    torch.save(learning.state(), checkpoint)
 
 
-def write(model, mark, learning, changes):
-    """A folder with the averaged weights, which `wake` reads, and some entries of its files of JSON changed."""
+def write(model, mark, learning):
+    """A folder with the averaged weights, which `wake` reads."""
     out = model.with_name(f"{model.name}-{mark}")
     shutil.copytree(model, out, dirs_exist_ok=True, ignore=shutil.ignore_patterns("checkpoints", "torch.pt", "*.jsonl", "sheet.png"))
     text, unet = learning.averaged()
     save_file({f"text_model.{name.removeprefix('text_model.')}": value for name, value in halves(text).items()}, out / TEXT)
     save_file(halves(unet), out / UNET)
-    for name, entries in changes.items():
-        config = json.loads((out / name).read_text())
-        (out / name).write_text(json.dumps({**config, **entries}, indent=2))
     print(f"wrote {out}", flush=True)
 
 
@@ -316,24 +254,23 @@ def report(learning, steps, seconds):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["autoencoder", "model"])
     parser.add_argument("model", type=Path, help="folder that `wake train text-to-image` wrote")
     parser.add_argument("data", type=Path, help="data set of `wake dataset`")
     parser.add_argument("--images", type=int, default=40_000)
     parser.add_argument("--batch", type=int, default=32)
-    parser.add_argument("--steps", type=int, default=6000, help="of the autoencoder")
     parser.add_argument("--samples", default="80000,250000,500000,1000000", help="numbers of images seen that are written")
     parser.add_argument("--rate", type=float, default=5e-4)
-    parser.add_argument("--predict", choices=["velocity", "noise"], default="velocity", help="what the U-Net predicts")
-    parser.add_argument("--seconds", type=float, default=math.inf, help="stop `model` after this time, to go on later")
-    parser.add_argument("--bf16", action="store_true", help="compute losses of `model` in bfloat16; weights keep 32 bits")
+    parser.add_argument("--uniform", action="store_true", help="draw all diffusion steps alike, not half of them from the noisiest tenth")
+    parser.add_argument("--random-text", action="store_true", help="begin with random weights of the text encoder as well")
+    parser.add_argument("--seconds", type=float, default=math.inf, help="stop after this time, to go on later")
+    parser.add_argument("--bf16", action="store_true", help="compute losses in bfloat16; weights keep 32 bits")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     torch.manual_seed(options.seed)
     torch.backends.cuda.matmul.allow_tf32 = torch.backends.cudnn.allow_tf32 = True
     torch.backends.cudnn.benchmark = True
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    {"autoencoder": train_autoencoder, "model": train_model}[options.what](options, device)
+    train(options, device)
 
 
 if __name__ == "__main__":

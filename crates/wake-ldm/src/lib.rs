@@ -12,6 +12,8 @@
 mod error;
 mod options;
 pub mod streams;
+#[cfg(any(feature = "wake-model", feature = "autodiff"))]
+mod eigen;
 
 pub mod unet;
 

@@ -29,6 +29,7 @@ mod sheet;
 mod stage;
 mod stage_options;
 mod text_to_image;
+mod prompt_reading;
 mod small_pipeline;
 mod sea_training;
 mod wake_model;

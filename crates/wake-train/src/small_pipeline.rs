@@ -1,5 +1,5 @@
-//! Training of a small latent diffusion model from scratch, in a run folder: the autoencoder, then text encoder and U-Net
-//! together.
+//! Training of a small latent diffusion model from scratch, in a run folder: the autoencoder in closed form, the text encoder
+//! alone, then text encoder and U-Net together.
 
 use std::path::Path;
 
@@ -9,38 +9,42 @@ use serde_json::{Value, json};
 use super::folder::RunFolder;
 use super::pairs::TrainingPairs;
 use super::progress::{Progress, counted};
+use super::prompt_reading::{PromptReader, ReadingTask};
 use super::run::Run;
 use super::sheet::write_sheet;
 use super::stage::Stage;
 use super::stage_options::{StageDefaults, StageOptions};
 use super::text_to_image::{
-    AutoencoderTask, PREDICTION, PromptedImages, PromptedLatents, TextToImage, TextToImageTask,
+    PREDICTION, PromptedImages, PromptedLatents, TextToImage, TextToImageTask,
 };
 use crate::error::{Error, Result};
 use wake_dataset::Pair;
 use wake_ldm::autoencoder::{AutoencoderKl, AutoencoderKlConfig};
 use wake_ldm::pipeline::{Pipeline, PipelineParts, Request};
-use wake_ldm::scheduler::{NoiseSchedule, SchedulerConfig, SchedulerOption};
+use wake_ldm::scheduler::{NoiseSchedule, SchedulerConfig, SchedulerOption, Spacing};
 use wake_ldm::text::ClipTextConfig;
 use wake_ldm::unet::UNetConfig;
-use wake_nn::weights::{Layout, Precision, save_folder};
+use wake_nn::weights::{Layout, Precision, load, save_as, save_folder};
 use whole_files::fingerprint;
 
-/// Names and defaults of the two stages.
-const AUTOENCODER: &str = "autoencoder-kl";
+/// Names and defaults of the stages.
+const READER: &str = "text-encoder";
 const MODEL: &str = "text-to-image";
 const DEFAULTS: StageDefaults = StageDefaults {
     steps: 5000,
     batch: 16,
     rate: 5e-4,
 };
-const AUTOENCODER_DEFAULTS: StageDefaults = StageDefaults {
-    steps: 2000,
+const READER_DEFAULTS: StageDefaults = StageDefaults {
+    steps: 4000,
     ..DEFAULTS
 };
 /// Files written by the stages.
+const READER_FILE: &str = "text-encoder.safetensors";
 const VAE: &str = "vae/diffusion_pytorch_model.safetensors";
 const SHEET: &str = "sheet.png";
+/// Names and shapes of the weights in files.
+const LAYOUT: Layout = Layout::Diffusers;
 /// Images read or simulated at the same time.
 const AT_ONCE: u64 = 64;
 /// Images of a sheet, and their sampling steps.
@@ -54,8 +58,8 @@ const TOKENS: usize = 128;
 pub struct PipelineTraining<'a> {
     /// Training pairs.
     pub pairs: &'a TrainingPairs,
-    /// Steps of the autoencoder; `None`: the default.
-    pub autoencoder_steps: Option<usize>,
+    /// Steps of the text encoder alone; `None`: the default.
+    pub text_steps: Option<usize>,
     /// Shape of the latents.
     pub latents: LatentShape,
     /// Steps of text encoder and U-Net after which to stop, to be resumed later; `None`: all.
@@ -67,10 +71,10 @@ pub struct PipelineTraining<'a> {
 /// Shape of the latents of a small pipeline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LatentShape {
-    /// Channels.
+    /// Channels, at most `downsampling²`.
     pub channels: usize,
-    /// Levels of the autoencoder, 1 to 3: a latent pixel covers 4, 8 or 16 pixels along each axis.
-    pub levels: usize,
+    /// Rows and columns of pixels per latent pixel.
+    pub downsampling: usize,
 }
 
 impl Default for LatentShape {
@@ -78,14 +82,14 @@ impl Default for LatentShape {
     fn default() -> Self {
         Self {
             channels: 32,
-            levels: 3,
+            downsampling: 16,
         }
     }
 }
 
 impl LatentShape {
     fn autoencoder(self) -> AutoencoderKlConfig {
-        AutoencoderKlConfig::small(self.channels, self.levels)
+        AutoencoderKlConfig::linear(self.channels, self.downsampling)
     }
 
     fn unet(self) -> UNetConfig {
@@ -98,13 +102,21 @@ impl PipelineTraining<'_> {
     ///
     /// # Errors
     ///
-    /// As [`RunOptions::validate`](super::RunOptions::validate), and [`wake_nn::Error::InvalidOption`] for an empty set, or for
-    /// images that are not square or whose side is not a multiple of the models' downsampling.
+    /// As [`RunOptions::validate`](super::RunOptions::validate); [`wake_nn::Error::OutOfRange`] for a shape of the latents outside
+    /// its range; [`wake_nn::Error::InvalidOption`] for an empty set, or for images that are not square or whose side is not a
+    /// multiple of the models' downsampling.
     pub fn check(&self) -> Result<()> {
         let constants = self.options.run(&DEFAULTS, Value::Null);
         constants.validate(self.options.devices.len())?;
+        let LatentShape {
+            channels,
+            downsampling,
+        } = self.latents;
+        let (range, most) = (wake_nn::check_range, (downsampling * downsampling) as f64);
+        range("downsampling", downsampling as f64, 1.0, 64.0).map_err(Error::Value)?;
+        range("latents", channels as f64, 1.0, most).map_err(Error::Value)?;
         let [rows, columns] = self.pairs.source().size();
-        let multiple = 4 * self.latents.autoencoder().downsampling();
+        let multiple = 4 * downsampling;
         if rows == columns && rows.is_multiple_of(multiple) && !self.pairs.is_empty() {
             return Ok(());
         }
@@ -120,16 +132,14 @@ impl PipelineTraining<'_> {
     /// Memory of images and latents \[bytes\].
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        let (pixels, down) = (
-            self.pairs.source().size().iter().product::<usize>(),
-            self.latents.autoencoder().downsampling(),
-        );
-        // Two bytes per pixel; per latent two bytes, and four more while the latents are scaled.
-        let each = 2 * pixels + 6 * self.latents.channels * pixels / (down * down);
+        let pixels: usize = self.pairs.source().size().iter().product();
+        let down = self.latents.downsampling.max(1);
+        // Two bytes per pixel and latent.
+        let each = 2 * pixels + 2 * self.latents.channels * pixels / (down * down);
         self.pairs.len().saturating_mul(each as u64)
     }
 
-    /// Runs both stages; a killed run can be resumed from its last checkpoints.
+    /// Fits the autoencoder and runs both stages; a killed run can be resumed from its last checkpoints.
     ///
     /// Writes the files that [`Pipeline::load`] reads, `sheet.png`, logs, `config.json`, `run.json` and `checkpoints/`.
     ///
@@ -146,27 +156,43 @@ impl PipelineTraining<'_> {
         });
         let identity = self.pairs.identity();
         let learning = options.learning_devices()?;
-        let begin = (AUTOENCODER, options.resume);
+        let begin = (READER, options.resume);
         let mut folder = RunFolder::open(out, &model, &identity, begin)?;
         let images = counted("pairs", self.pairs.len(), progress, |done| {
             self.images(done)
         })?;
-        if folder.unfinished(AUTOENCODER, &[VAE])?.is_some() {
-            self.autoencoder(&mut folder, &images, learning.clone(), &model, progress)?;
+        let (device, count) = (options.device(), images.len() as u64);
+        if !out.join(VAE).exists() {
+            let config = self.latents.autoencoder();
+            let autoencoder = counted("autoencoder", count, progress, |done| {
+                images.fit(&config, &device, |n| done(n as u64))
+            });
+            let (vae, precision) = (out.join("vae"), Precision::F16);
+            save_folder(&autoencoder, LAYOUT, &config.to_json(), &vae, precision)?;
         }
 
+        let reader = out.join(READER_FILE);
+        if folder.unfinished(READER, &[READER_FILE])?.is_some() {
+            self.reader(&mut folder, &images, learning.clone(), &reader, progress)?;
+        }
+
+        // Without a signal in the last step, brightness and wake come from the prompt alone (Lin et al., 2024).
         let scheduler = SchedulerConfig::stable_diffusion("ddim")?
-            .with(SchedulerOption::Prediction(PREDICTION))?;
+            .with(SchedulerOption::Prediction(PREDICTION))?
+            .with(SchedulerOption::ZeroTerminalSnr(true))?
+            .with(SchedulerOption::Spacing(Spacing::Trailing))?;
         let vae = fingerprint(&out.join(VAE))?;
-        let identity = json!({"data": identity, "vae": vae, "scheduler": scheduler.to_json()});
-        let device = options.device();
-        let autoencoder = AutoencoderKl::from_folder(&out.join("vae"), &device)?;
-        let count = images.len() as u64;
-        let (set, autoencoder) = counted("latents", count, progress, |done| {
-            images.encode(autoencoder, &device, |n| done(n as u64))
+        let identity = json!({
+            "data": identity, "vae": vae, "text_encoder": fingerprint(&reader)?, "scheduler": scheduler.to_json(),
         });
+        let autoencoder = AutoencoderKl::from_folder(&out.join("vae"), &device)?;
+        let set = counted("latents", count, progress, |done| {
+            images.encode(&autoencoder, &device, |n| done(n as u64))
+        });
+        let text_encoder =
+            load(PromptReader::new(&text(), &learning[0]), LAYOUT, &reader)?.text_encoder;
         let init = |device: &Device| TextToImage {
-            text_encoder: text().init(device),
+            text_encoder,
             unet: self.latents.unet().init(device),
         };
         let run = Run::of(
@@ -195,40 +221,32 @@ impl PipelineTraining<'_> {
         stage.train(&mut folder, run, &task, progress, show)
     }
 
-    /// Trains the autoencoder.
-    fn autoencoder(
+    /// Trains the text encoder to state the values of prompts.
+    fn reader(
         &self,
         folder: &mut RunFolder,
         images: &PromptedImages,
         learning: Vec<Device>,
-        model: &Value,
+        file: &Path,
         progress: &dyn Fn(Progress),
     ) -> Result<()> {
         let options = StageOptions {
-            steps: self.autoencoder_steps,
+            steps: self.text_steps,
             ..self.options.clone()
         };
-        let constants = options.run(&AUTOENCODER_DEFAULTS, self.pairs.identity());
-        let init = |device: &Device| self.latents.autoencoder().init(device);
-        let run = Run::of(AUTOENCODER, &model["vae"], init, constants, learning)?;
-        let task = AutoencoderTask {
-            images,
+        let constants = options.run(&READER_DEFAULTS, self.pairs.identity());
+        let init = |device: &Device| PromptReader::new(&text(), device);
+        let run = Run::of(READER, &text().to_json(), init, constants, learning)?;
+        let task = ReadingTask {
+            prompts: images.prompts(),
+            statements: images.statements(),
             seed: options.seed,
         };
-        let vae = folder.path().join("vae");
-        let show = |run: &Run<AutoencoderKl>| -> Result<()> {
-            let (averaged, config) = (run.averaged(), &model["vae"]);
-            let precision = Precision::F16;
-            Ok(save_folder(
-                &averaged,
-                Layout::Diffusers,
-                config,
-                &vae,
-                precision,
-            )?)
+        let show = |run: &Run<PromptReader>| -> Result<()> {
+            Ok(save_as(&run.averaged(), LAYOUT, file, Precision::F16)?)
         };
-        let steps = options.steps(&AUTOENCODER_DEFAULTS);
-        let stage = self.stage(AUTOENCODER, steps, &[VAE], folder);
+        let steps = options.steps(&READER_DEFAULTS);
+        let stage = self.stage(READER, steps, &[READER_FILE], folder);
         stage.train(folder, run, &task, progress, show)
     }
 

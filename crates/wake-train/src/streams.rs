@@ -13,8 +13,6 @@ pub(crate) const CELLS: u32 = 2001;
 pub(crate) const PLACES: u32 = 2002;
 /// Places of the training patches of a sea.
 pub(crate) const SEA_PLACES: u32 = 2003;
-/// Places of the training crops of an autoencoder.
-pub(crate) const CROPS: u32 = 2004;
 /// Diffusion steps of training examples.
 pub(crate) const STEPS: u32 = 2100;
 /// Prompts left out in text-to-image training.
@@ -51,7 +49,6 @@ mod tests {
             one(CELLS),
             one(PLACES),
             one(SEA_PLACES),
-            one(CROPS),
             one(STEPS),
             one(LEFT_OUT),
             one(PAIRS),

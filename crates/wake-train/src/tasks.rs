@@ -13,7 +13,7 @@ use crate::error::Result;
 use crate::prompts::Prompts;
 use crate::streams;
 use wake_dataset::shuffled;
-use wake_ldm::conditioning::{MapGrid, QUANTITIES, Vocabulary, WEDGE, places, statement, tokens};
+use wake_ldm::conditioning::{MapGrid, Vocabulary, WEDGE, places, statement, tokens};
 use wake_ldm::network::{
     ChannelWindows, ConditioningInputs, Flow, PatchTransform, Prior, PromptParser, SeaFields,
     windows,
@@ -80,16 +80,23 @@ impl Task<PromptParser> for ParserTask<'_> {
             .map(|(text, conditions)| (tokens(&text), statement(&conditions)))
             .unzip();
         let (windows, length) = windows(&prompts, self.vocabulary, device);
-        let count = prompts.len() * QUANTITIES;
-        let said: Tensor<2> = Tensor::from_data(TensorData::new(said.concat(), [count, 3]), device);
-        let read = model.forward(windows, length).reshape([count, 3]);
-        let error = (read - said.clone()).square();
-        let flags = said.narrow(1, 0, 1);
-        let stated = error.clone().narrow(1, 0, 1).mean();
-        let values = (error.narrow(1, 1, 2) * flags).mean();
-        let terms = vec![("stated", number(&stated)), ("values", number(&values))];
-        (stated + values, terms)
+        statement_loss(model.forward(windows, length), said.concat())
     }
+}
+
+/// Loss of statements that were read from prompts: squared errors of the values that the prompt states, and of whether it does.
+///
+/// - `read`: `[prompts, 3 · QUANTITIES]`
+/// - `said`: the right statements, one after another
+pub(super) fn statement_loss(read: Tensor<2>, said: Vec<f32>) -> (Tensor<1>, Terms) {
+    let count = said.len() / 3;
+    let said: Tensor<2> = Tensor::from_data(TensorData::new(said, [count, 3]), &read.device());
+    let error = (read.reshape([count, 3]) - said.clone()).square();
+    let flags = said.narrow(1, 0, 1);
+    let stated = error.clone().narrow(1, 0, 1).mean();
+    let values = (error.narrow(1, 1, 2) * flags).mean();
+    let terms = vec![("stated", number(&stated)), ("values", number(&values))];
+    (stated + values, terms)
 }
 
 /// Latent pixels of an image in a step.

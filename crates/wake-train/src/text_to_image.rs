@@ -1,4 +1,4 @@
-//! Training tasks of a latent diffusion model: the autoencoder, then text encoder and U-Net.
+//! Images with prompts, their latents, and the training task of text encoder and U-Net.
 
 use std::ops::Range;
 
@@ -13,22 +13,19 @@ use super::tasks::{examples, noise_of};
 use crate::error::{Error, Result};
 use crate::streams::{self, FINE_TUNE_STREAM};
 use wake_dataset::Pair;
-use wake_ldm::autoencoder::AutoencoderKl;
+use wake_ldm::autoencoder::{AutoencoderKl, AutoencoderKlConfig};
+use wake_ldm::conditioning::statement;
 use wake_ldm::pipeline::token_ids;
 use wake_ldm::scheduler::{NoiseSchedule, Prediction};
-use wake_ldm::streams::POSTERIOR_STREAM;
 use wake_ldm::text::ClipText;
 use wake_ldm::unet::{UNet, UNetInput};
 use wake_nn::noise::{NoiseSource, normal_batch};
+use wake_text::PartialScene;
 
-/// Rows and columns of the autoencoder's training crops, unless images are smaller.
-const CROP: usize = 128;
-/// Weight of the squared Laplacian of the error, relative to the squared error.
-const CURVATURE: f64 = 1.0;
-/// Weight of the divergence of a latent, relative to the squared error.
-const DIVERGENCE: f64 = 1e-5;
 /// Images that are encoded at once.
-const ENCODED: usize = 16;
+const AT_ONCE: usize = 16;
+/// Share of the diffusion steps, the noisiest, that half of the examples have.
+const LATE: f64 = 0.1;
 /// Target of the U-Net.
 pub(crate) const PREDICTION: Prediction = Prediction::Velocity;
 
@@ -38,10 +35,11 @@ pub(crate) struct PromptedImages {
     size: [usize; 2],
     pixels: Vec<f16>,
     prompts: Vec<Vec<i32>>,
+    statements: Vec<Vec<f32>>,
 }
 
 impl PromptedImages {
-    /// Adds the image of a pair, and its prompt as CLIP tokens.
+    /// Adds the image of a pair, its prompt as CLIP tokens, and the values that the prompt states: none if it is unreadable.
     ///
     /// # Errors
     ///
@@ -61,6 +59,8 @@ impl PromptedImages {
                 ),
             }));
         }
+        let said = PartialScene::read(&pair.prompt).unwrap_or_default();
+        self.statements.push(statement(&said));
         let pixels = pair.image.pixels.iter().map(|&grey| f16::from_f32(grey));
         self.pixels.extend(pixels);
         self.prompts.push(token_ids(None, &pair.prompt));
@@ -72,63 +72,71 @@ impl PromptedImages {
         self.prompts.len()
     }
 
-    /// Windows of `size` rows and columns at places (image, `[row, column]`), grey 0…1.
-    fn windows(
-        &self,
-        places: &[(usize, [usize; 2])],
-        size: [usize; 2],
-        device: &Device,
-    ) -> Tensor<4> {
-        let [rows, columns] = self.size;
-        let mut numbers = Vec::with_capacity(places.len() * size[0] * size[1]);
-        for &(image, [row, column]) in places {
-            for r in row..row + size[0] {
-                let first = (image * rows + r) * columns + column;
-                let line = &self.pixels[first..first + size[1]];
-                numbers.extend(line.iter().map(|grey| grey.to_f32()));
-            }
-        }
-        let data = TensorData::new(numbers, [places.len(), 1, size[0], size[1]]);
-        Tensor::from_data(data, device)
+    /// Prompts as tokens.
+    pub(crate) fn prompts(&self) -> &[Vec<i32>] {
+        &self.prompts
     }
 
-    /// Encodes all images to the means of their posteriors, shifted and scaled to an overall mean of 0 and variance of 1.
+    /// Values that the prompts state.
+    pub(crate) fn statements(&self) -> &[Vec<f32>] {
+        &self.statements
+    }
+
+    /// Fits a linear autoencoder to all images.
     ///
-    /// - `done`: called with the number of images after each batch
-    ///
-    /// Returns the latents, and the autoencoder with this shift and scale.
+    /// - `done`: called with the number of images of each batch
     ///
     /// # Panics
     ///
-    /// When there is no image.
-    pub(crate) fn encode(
-        self,
-        autoencoder: AutoencoderKl,
+    /// As [`AutoencoderKlConfig::fit`].
+    pub(crate) fn fit(
+        &self,
+        config: &AutoencoderKlConfig,
         device: &Device,
         done: impl Fn(usize),
-    ) -> (PromptedLatents, AutoencoderKl) {
-        let all: Vec<(usize, [usize; 2])> = (0..self.len()).map(|image| (image, [0, 0])).collect();
-        let (mut latents, mut shape) = (Vec::<f32>::new(), [0; 3]);
-        for places in all.chunks(ENCODED) {
-            let images = self.windows(places, self.size, device);
+    ) -> AutoencoderKl {
+        let batches = self.batches(device).map(|images| {
+            done(images.dims()[0]);
+            images * 2.0 - 1.0
+        });
+        config.fit(batches, device)
+    }
+
+    /// Encodes all images to the means of their posteriors.
+    ///
+    /// - `done`: called with the number of images of each batch
+    pub(crate) fn encode(
+        self,
+        autoencoder: &AutoencoderKl,
+        device: &Device,
+        done: impl Fn(usize),
+    ) -> PromptedLatents {
+        let (mut latents, mut shape) = (Vec::<f16>::new(), [0; 3]);
+        for images in self.batches(device) {
             let means = autoencoder.encode(autoencoder.scaled(images)).mode();
-            let [_, channels, rows, columns] = means.dims();
+            let means = autoencoder.to_latents(means);
+            let [count, channels, rows, columns] = means.dims();
             shape = [channels, rows, columns];
-            latents.extend(means.into_data().iter::<f32>());
-            done(places.len());
+            latents.extend(means.into_data().iter::<f32>().map(f16::from_f32));
+            done(count);
         }
-        let count = latents.len() as f64;
-        let mean = latents.iter().map(|&z| f64::from(z)).sum::<f64>() / count;
-        let squares = latents.iter().map(|&z| (f64::from(z) - mean).powi(2));
-        let scale = (count / squares.sum::<f64>().max(f64::MIN_POSITIVE)).sqrt();
-        let scaled = latents.iter().map(|&z| (f64::from(z) - mean) * scale);
-        let set = PromptedLatents {
+        PromptedLatents {
             shape,
-            latents: scaled.map(f16::from_f64).collect(),
+            latents,
             prompts: self.prompts,
             empty: token_ids(None, ""),
-        };
-        (set, autoencoder.with_latents(mean, scale))
+        }
+    }
+
+    /// All images, some at a time, `[images, 1, rows, columns]`, grey 0…1.
+    fn batches(&self, device: &Device) -> impl Iterator<Item = Tensor<4>> {
+        let [rows, columns] = self.size;
+        let batches = self.pixels.chunks(AT_ONCE * (rows * columns).max(1));
+        batches.map(move |pixels| {
+            let grey: Vec<f32> = pixels.iter().map(|grey| grey.to_f32()).collect();
+            let shape = [pixels.len() / (rows * columns), 1, rows, columns];
+            Tensor::from_data(TensorData::new(grey, shape), device)
+        })
     }
 }
 
@@ -148,97 +156,6 @@ impl PromptedLatents {
     }
 }
 
-/// Task of the autoencoder: squared error of the pixels and of its Laplacian, and a small divergence term of the latents.
-///
-/// ```text
-/// e = decode(μ + σ n) − image,    loss = mean e² + mean (∇²e)² + 10⁻⁵ mean KL
-/// ```
-///
-/// on crops of 128 × 128 pixels anywhere in the images, scaled to −1…1; KL is the divergence of one latent number from a
-/// standard normal distribution. The Laplacian weights an error of wavenumber k by k⁴: short sea waves have a hundredth of the
-/// power of long ones and would be learnt last.
-///
-/// # References
-///
-/// Kingma & Welling (2014), "Auto-Encoding Variational Bayes", Eq. 10; Rombach et al. (2022), "High-Resolution Image
-/// Synthesis with Latent Diffusion Models", appendix G (the weight).
-#[derive(Debug)]
-pub(crate) struct AutoencoderTask<'a> {
-    /// Images, at least one, with rows and columns that are multiples of the autoencoder's downsampling.
-    pub images: &'a PromptedImages,
-    /// Seed of order, places and noise.
-    pub seed: u64,
-}
-
-impl Task<AutoencoderKl> for AutoencoderTask<'_> {
-    type Batch = Range<u64>;
-
-    fn batch(&self, positions: Range<u64>) -> Result<Range<u64>> {
-        Ok(positions)
-    }
-
-    fn loss(
-        &self,
-        model: &AutoencoderKl,
-        device: &Device,
-        positions: &Range<u64>,
-    ) -> (Tensor<1>, Terms) {
-        let random = NoiseSource::new(self.seed);
-        let crop = self.images.size.map(|side| side.min(CROP));
-        let indices = examples(self.seed, positions.clone(), self.images.len());
-        let place = |position: u64| -> [usize; 2] {
-            std::array::from_fn(|axis| {
-                let room = self.images.size[axis] - crop[axis] + 1;
-                let draw = random.uniform(streams::CROPS, 2 * position + axis as u64);
-                (draw * room as f64) as usize
-            })
-        };
-        let places = indices.into_iter().zip(positions.clone().map(place));
-        let images = self
-            .images
-            .windows(&places.collect::<Vec<_>>(), crop, device);
-        let images = model.scaled(images);
-        let posterior = model.encode(images.clone());
-        let [count, channels, rows, columns] = posterior.mean.dims();
-        let sources: Vec<NoiseSource> = positions.clone().map(|p| noise_of(self.seed, p)).collect();
-        let noise = normal_batch(
-            &sources,
-            POSTERIOR_STREAM,
-            [channels, rows, columns],
-            device,
-        );
-        let decoded = model.decode(posterior.sample(noise));
-        let error = decoded - images;
-        let curvature = laplacian(&error).square().mean();
-        let error = error.square().mean();
-        let numbers = (count * channels * rows * columns) as f64;
-        let divergence = posterior.kl().sum() / numbers;
-        let terms = vec![
-            ("error", number(&error)),
-            ("curvature", number(&curvature)),
-            ("divergence", number(&divergence)),
-        ];
-        (
-            error + curvature * CURVATURE + divergence * DIVERGENCE,
-            terms,
-        )
-    }
-}
-
-/// Sum of the four neighbours less four times the pixel, without the edges.
-///
-/// # Shapes
-///
-/// `[count, channels, rows, columns]` with at least 3 rows and columns → two rows and two columns fewer
-fn laplacian(images: &Tensor<4>) -> Tensor<4> {
-    let [_, _, rows, columns] = images.dims();
-    let at = |row: usize, column: usize| {
-        let rows = images.clone().narrow(2, row, rows - 2);
-        rows.narrow(3, column, columns - 2)
-    };
-    at(0, 1) + at(2, 1) + at(1, 0) + at(1, 2) - at(1, 1) * 4.0
-}
-
 /// Text encoder and U-Net, trained together.
 #[derive(Module, Debug)]
 pub(crate) struct TextToImage {
@@ -255,7 +172,8 @@ pub(crate) struct TextToImage {
 /// loss = mean |unet(x, t, text encoder(prompt)) − v|²
 /// ```
 ///
-/// A tenth of the prompts are left out. The model predicts the velocity v; Stable Diffusion v1.4 predicts the noise n. A squared
+/// A tenth of the prompts are left out. Half of the steps t are drawn from the noisiest tenth: there the image depends on the
+/// prompt, elsewhere on the noisy latents, and without them the U-Net learns to ignore prompts first. The model predicts the velocity v; Stable Diffusion v1.4 predicts the noise n. A squared
 /// error of z counts 1/(1 − ᾱₜ) in v, but ᾱₜ/(1 − ᾱₜ) in n, which is 0.005 in the first steps of sampling, where the prompt
 /// decides.
 ///
@@ -289,9 +207,9 @@ impl Task<TextToImage> for TextToImageTask<'_> {
     ) -> (Tensor<1>, Terms) {
         let random = NoiseSource::new(self.seed);
         let indices = examples(self.seed, positions.clone(), self.set.prompts.len());
-        let count = self.schedule.steps() as f64;
-        let draw = |p: u64| (random.uniform(streams::STEPS, p) * count) as usize;
-        let steps: Vec<usize> = positions.clone().map(draw).collect();
+        let count = self.schedule.steps();
+        let steps = positions.clone().map(|p| step_of(random, p, count));
+        let steps: Vec<usize> = steps.collect();
         let told = positions.clone().zip(&indices).flat_map(|(p, &i)| {
             match is_told(random, streams::LEFT_OUT, p) {
                 true => &self.set.prompts[i],
@@ -315,6 +233,16 @@ impl Task<TextToImage> for TextToImageTask<'_> {
         let terms = vec![("velocity", number(&loss))];
         (loss, terms)
     }
+}
+
+/// Diffusion step of the example at a position: any of `count` for one half, one of the noisiest tenth for the other.
+fn step_of(random: NoiseSource, position: u64, count: usize) -> usize {
+    let uniform = random.uniform(streams::STEPS, position);
+    let place = match position.is_multiple_of(2) {
+        true => uniform,
+        false => 1.0 - LATE + LATE * uniform,
+    };
+    ((place * count as f64) as usize).min(count - 1)
 }
 
 #[cfg(all(test, feature = "flex"))]

@@ -25,7 +25,7 @@ pub(crate) const DEFAULTS: &[(&str, &str)] = &[
 
 /// Train a small text-to-image model in Stable Diffusion's layout from scratch, on images and prompts.
 ///
-/// Trains the autoencoder first, then text encoder and U-Net together. `wake generate --weights`, `wake evaluate
+/// Fits the autoencoder in closed form, trains the text encoder alone, then text encoder and U-Net together. `wake generate --weights`, `wake evaluate
 /// pipeline --weights` and `wake train fine-tune --weights` read the model.
 #[derive(Args)]
 pub(crate) struct Options {
@@ -35,17 +35,17 @@ pub(crate) struct Options {
     /// Number of pairs to simulate without --data
     #[arg(long, default_value_t = 4000, value_parser = clap::value_parser!(u64).range(8..=10_000_000))]
     count: u64,
-    /// Training steps of the autoencoder; --steps is for text encoder and U-Net
-    #[arg(long, default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..))]
-    autoencoder_steps: u32,
+    /// Training steps of the text encoder alone, on the values that prompts state; --steps is for text encoder and U-Net
+    #[arg(long, default_value_t = 4000, value_parser = clap::value_parser!(u32).range(1..))]
+    text_steps: u32,
     /// Stop after this many of --steps; continue with --resume
     #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(u32).range(1..))]
     stop_after: Option<u32>,
-    /// Pixels per latent pixel along each axis: 4, 8 or 16
-    #[arg(long, default_value = "16", value_parser = ["4", "8", "16"])]
-    downsampling: String,
-    /// Channels of the latents
-    #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u16).range(1..=512))]
+    /// Pixels per latent pixel along each axis
+    #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=64))]
+    downsampling: u16,
+    /// Channels of the latents, at most the square of --downsampling
+    #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u16).range(1..=4096))]
     latents: u16,
     #[command(flatten)]
     pace: Pace,
@@ -66,14 +66,10 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
     };
     let training = PipelineTraining {
         pairs: &pairs,
-        autoencoder_steps: Some(options.autoencoder_steps as usize),
+        text_steps: Some(options.text_steps as usize),
         latents: LatentShape {
             channels: usize::from(options.latents),
-            levels: match options.downsampling.as_str() {
-                "4" => 1,
-                "8" => 2,
-                _ => 3,
-            },
+            downsampling: usize::from(options.downsampling),
         },
         stop_after: options.stop_after.map(|steps| steps as usize),
         options: constants,

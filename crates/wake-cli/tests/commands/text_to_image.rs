@@ -3,7 +3,7 @@
 use super::{done, files, refused_by, refused_into, text};
 
 const SHORT: [&str; 8] = [
-    "--autoencoder-steps",
+    "--text-steps",
     "1",
     "--steps",
     "2",
@@ -45,7 +45,7 @@ fn a_model_is_learnt_resumed_and_drawn_with() {
     refused_into(
         "train",
         &common,
-        &["stage autoencoder-kl has made 1 steps", "resume this one"],
+        &["stage text-encoder has made 1 steps", "resume this one"],
         &killed,
     );
 
@@ -76,6 +76,11 @@ fn what_no_model_can_be_made_of_is_named() {
         "train",
         &["text-to-image", "--rate", "0"],
         &["rate is 0", "outside"],
+    );
+    refused_by(
+        "train",
+        &["text-to-image", "--downsampling", "4", "--latents", "17"],
+        &["latents is 17", "16"],
     );
     refused_by("train", &["text-to-image", "--resume"], &["resume"]);
 }

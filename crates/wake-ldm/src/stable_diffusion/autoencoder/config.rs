@@ -21,7 +21,7 @@ pub struct AutoencoderKlConfig {
     /// pixels again after the last; 1 in Stable Diffusion.
     #[config(default = 1)]
     pub patch_size: usize,
-    /// Width of each level, from full size down; each level but the last halves the image.
+    /// Width of each level, from full size down; each level but the last halves the image. Empty for a linear model.
     #[config(default = "vec![128, 256, 512, 512]")]
     pub block_out_channels: Vec<usize>,
     /// Residual blocks per level of the encoder; the decoder has one more.
@@ -78,13 +78,28 @@ impl AutoencoderKlConfig {
             .with_sample_size(256)
     }
 
+    /// Configuration of a linear model of grey images, see [`fit`](Self::fit).
+    ///
+    /// - `latent_channels`: at most `side²`
+    /// - `side`: rows and columns of the squares of pixels
+    pub fn linear(latent_channels: usize, side: usize) -> Self {
+        Self::small(latent_channels, 1)
+            .with_block_out_channels(Vec::new())
+            .with_patch_size(side)
+    }
+
+    /// Whether the model has no levels, only convolutions of 1 × 1 pixels between squares of pixels and latents.
+    pub(super) fn is_linear(&self) -> bool {
+        self.block_out_channels.is_empty()
+    }
+
     /// Pixels per latent pixel along each axis.
     ///
     /// ```text
-    /// patch_size · 2^(levels − 1)
+    /// patch_size · 2^(levels − 1)        patch_size without levels
     /// ```
     pub fn downsampling(&self) -> usize {
-        self.patch_size << (self.block_out_channels.len() - 1)
+        self.patch_size << self.block_out_channels.len().saturating_sub(1)
     }
 
     /// Reads the `config.json` of a diffusers `AutoencoderKL`.
@@ -183,13 +198,12 @@ impl AutoencoderKlConfig {
     /// # Errors
     ///
     /// [`Error::OutOfRange`] for a number outside its range, [`Error::InvalidOption`] for a width
-    /// that the groups do not divide.
+    /// that the groups do not divide, and for a linear model without one of its convolutions.
     pub fn validate(&self) -> Result<()> {
         let counts = [
             ("in_channels", self.in_channels, 4096.0),
             ("out_channels", self.out_channels, 4096.0),
             ("patch_size", self.patch_size, 64.0),
-            ("number of levels", self.block_out_channels.len(), 16.0),
             ("layers_per_block", self.layers_per_block, 64.0),
             ("latent_channels", self.latent_channels, 4096.0),
             ("norm_num_groups", self.norm_groups, 65536.0),
@@ -197,6 +211,20 @@ impl AutoencoderKlConfig {
         ];
         for (name, value, max) in counts {
             check_range(name, value as f64, 1.0, max)?;
+        }
+        check_range(
+            "number of levels",
+            self.block_out_channels.len() as f64,
+            0.0,
+            16.0,
+        )?;
+        if self.is_linear() && !(self.quant_conv && self.post_quant_conv) {
+            return Err(Error::InvalidOption {
+                option: "block_out_channels".to_owned(),
+                value: "empty".to_owned(),
+                expected: "a width for each level, or use_quant_conv and use_post_quant_conv true"
+                    .to_owned(),
+            });
         }
         check_range("scaling_factor", self.scaling_factor, 1e-6, 1e6)?;
         check_range("shift_factor", self.shift_factor, -1e6, 1e6)?;

@@ -3,13 +3,14 @@
 mod blocks;
 mod config;
 mod gaussian;
+mod principal;
 mod tiling;
 
 use std::path::Path;
 
 use burn::module::Module;
 use burn::nn::conv::Conv2d;
-use burn::tensor::{Device, Tensor};
+use burn::tensor::{DType, Device, Tensor};
 
 use blocks::{Decoder, Encoder};
 use wake_nn::Result;
@@ -31,6 +32,8 @@ pub use tiling::Tiling;
 ///
 /// Images lie in [−1, 1]. `encode` and `decode` work on z; [`to_latents`](Self::to_latents) and
 /// [`from_latents`](Self::from_latents) convert to and from the latents of the diffusion model.
+/// Without levels in its configuration, the network is linear: squares of pixels become latents and pixels again through the
+/// two convolutions of 1 × 1 pixels, see [`AutoencoderKlConfig::fit`].
 ///
 /// # References
 ///
@@ -38,10 +41,10 @@ pub use tiling::Tiling;
 /// 3.1 and appendix G.
 #[derive(Module, Debug)]
 pub struct AutoencoderKl {
-    encoder: Encoder,
+    encoder: Option<Encoder>,
     quant_conv: Option<Conv2d>,
     post_quant_conv: Option<Conv2d>,
-    decoder: Decoder,
+    decoder: Option<Decoder>,
     #[module(skip)]
     config: AutoencoderKlConfig,
 }
@@ -57,15 +60,20 @@ impl AutoencoderKlConfig {
             panic!("{error}");
         }
         let latent = self.latent_channels;
+        let square = self.patch_size * self.patch_size;
+        let (encoded, decoder_input) = match self.is_linear() {
+            true => (self.in_channels * square, self.out_channels * square),
+            false => (2 * latent, latent),
+        };
         AutoencoderKl {
-            encoder: Encoder::new(self, device),
+            encoder: (!self.is_linear()).then(|| Encoder::new(self, device)),
             quant_conv: self
                 .quant_conv
-                .then(|| conv1x1(2 * latent, 2 * latent, device)),
+                .then(|| conv1x1(encoded, 2 * latent, device)),
             post_quant_conv: self
                 .post_quant_conv
-                .then(|| conv1x1(latent, latent, device)),
-            decoder: Decoder::new(self, device),
+                .then(|| conv1x1(latent, decoder_input, device)),
+            decoder: (!self.is_linear()).then(|| Decoder::new(self, device)),
             config: self.clone(),
         }
     }
@@ -136,10 +144,12 @@ impl AutoencoderKl {
     /// As [`encode`](Self::encode), with `2 · latent_channels` channels.
     pub fn moments(&self, image: Tensor<4>) -> Tensor<4> {
         let dtype = image.dtype();
-        let image = cast_to(image, self.decoder.dtype());
-        let encoded = self
-            .encoder
-            .forward(space_to_depth(image, self.config.patch_size));
+        let image = cast_to(image, self.dtype());
+        let squares = space_to_depth(image, self.config.patch_size);
+        let encoded = match &self.encoder {
+            Some(encoder) => encoder.forward(squares),
+            None => squares,
+        };
         let moments = match &self.quant_conv {
             Some(conv) => convolve(conv, encoded),
             None => encoded,
@@ -155,15 +165,25 @@ impl AutoencoderKl {
     /// - result: `[batch, out_channels, rows · downsampling, columns · downsampling]`
     pub fn decode(&self, z: Tensor<4>) -> Tensor<4> {
         let dtype = z.dtype();
-        let z = cast_to(z, self.decoder.dtype());
+        let z = cast_to(z, self.dtype());
         let z = match &self.post_quant_conv {
             Some(conv) => convolve(conv, z),
             None => z,
         };
-        cast_to(
-            depth_to_space(self.decoder.forward(z), self.config.patch_size),
-            dtype,
-        )
+        let squares = match &self.decoder {
+            Some(decoder) => decoder.forward(z),
+            None => z,
+        };
+        cast_to(depth_to_space(squares, self.config.patch_size), dtype)
+    }
+
+    /// Floating-point type of the weights.
+    fn dtype(&self) -> DType {
+        match (&self.decoder, &self.post_quant_conv) {
+            (Some(decoder), _) => decoder.dtype(),
+            (None, Some(conv)) => conv.weight.val().dtype(),
+            (None, None) => DType::F32,
+        }
     }
 
     /// Decodes the images of a batch one at a time, with the memory of one.
@@ -207,16 +227,6 @@ impl AutoencoderKl {
     /// Latents of the decoder: the inverse of [`to_latents`](Self::to_latents).
     pub fn from_latents(&self, latents: Tensor<4>) -> Tensor<4> {
         latents / self.config.scaling_factor + self.config.shift_factor
-    }
-
-    /// Returns the model with another shift and scale of latents, as used by [`to_latents`](Self::to_latents).
-    #[cfg(feature = "autodiff")]
-    pub fn with_latents(mut self, shift: f64, scale: f64) -> Self {
-        self.config = self
-            .config
-            .with_shift_factor(shift)
-            .with_scaling_factor(scale);
-        self
     }
 
     /// Factor on latents before diffusion.
