@@ -163,7 +163,8 @@ impl AutoencoderKlConfig {
     /// `config.json` from which diffusers reads this model.
     ///
     /// With a `patch_size` above 1 diffusers reads the network between the rearrangements of pixels
-    /// (torch's `PixelUnshuffle` and `PixelShuffle`).
+    /// (torch's `PixelUnshuffle` and `PixelShuffle`). It has no linear model: without levels, its two convolutions are the
+    /// whole network.
     pub fn to_json(&self) -> Value {
         let levels = self.block_out_channels.len();
         let patch = self.patch_size * self.patch_size;
