@@ -12,7 +12,6 @@
 mod error;
 mod options;
 pub mod streams;
-#[cfg(any(feature = "wake-model", feature = "autodiff"))]
 mod eigen;
 
 pub mod unet;
