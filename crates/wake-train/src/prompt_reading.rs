@@ -4,10 +4,11 @@ use std::ops::Range;
 
 use burn::module::Module;
 use burn::nn::{Linear, LinearConfig};
-use burn::tensor::{Device, Int, Tensor, TensorData};
+use burn::tensor::{Device, Int, Tensor};
 
 use super::run::{Task, Terms};
 use super::tasks::{examples, statement_loss};
+use super::text_to_image::token_batch;
 use crate::error::Result;
 use wake_ldm::conditioning::QUANTITIES;
 use wake_ldm::text::{ClipText, ClipTextConfig};
@@ -75,12 +76,7 @@ impl Task<PromptReader> for ReadingTask<'_> {
         positions: &Range<u64>,
     ) -> (Tensor<1>, Terms) {
         let indices = examples(self.seed, positions.clone(), self.prompts.len());
-        let ids: Vec<i32> = indices
-            .iter()
-            .flat_map(|&i| self.prompts[i].clone())
-            .collect();
-        let shape = [indices.len(), ids.len() / indices.len().max(1)];
-        let ids: Tensor<2, Int> = Tensor::from_data(TensorData::new(ids, shape), device);
+        let ids = token_batch(indices.iter().map(|&i| &self.prompts[i]), device);
         let said = indices.iter().flat_map(|&i| self.statements[i].clone());
         statement_loss(model.statements(ids), said.collect())
     }
@@ -96,7 +92,7 @@ mod tests {
     use wake_text::PartialScene;
 
     /// Two tokens state sixteen directions: the first token the quadrant, the second one the part of it. After training, each is
-    /// read within half of the distance to the next one; swapped tokens state another.
+    /// read within half of the distance to the next one.
     #[test]
     fn directions_are_read_from_tokens() {
         let device = Device::flex();
@@ -142,8 +138,7 @@ mod tests {
         for _ in 0..steps {
             assert!(run.step(&task).unwrap().0.applied);
         }
-        let ids: Vec<i32> = prompts.concat();
-        let ids = Tensor::from_data(TensorData::new(ids, [16, 4]), &device);
+        let ids = token_batch(prompts.iter(), &device);
         let read: Vec<f32> = run
             .averaged()
             .statements(ids)

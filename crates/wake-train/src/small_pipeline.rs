@@ -42,6 +42,7 @@ const READER_DEFAULTS: StageDefaults = StageDefaults {
 /// Files written by the stages.
 const READER_FILE: &str = "text-encoder.safetensors";
 const VAE: &str = "vae/diffusion_pytorch_model.safetensors";
+const VAE_CONFIG: &str = "vae/config.json";
 const SHEET: &str = "sheet.png";
 /// Names and shapes of the weights in files.
 const LAYOUT: Layout = Layout::Diffusers;
@@ -50,6 +51,8 @@ const AT_ONCE: u64 = 64;
 /// Images of a sheet, and their sampling steps.
 const SHOWN: u64 = 8;
 const DRAWN: usize = 25;
+/// Largest downsampling: the autoencoder is fitted in seconds.
+const MOST_PIXELS: f64 = 16.0;
 /// Channels of a token embedding.
 const TOKENS: usize = 128;
 
@@ -73,7 +76,7 @@ pub struct PipelineTraining<'a> {
 pub struct LatentShape {
     /// Channels, at most `downsampling²`.
     pub channels: usize,
-    /// Rows and columns of pixels per latent pixel.
+    /// Rows and columns of pixels per latent pixel, 1 to 16.
     pub downsampling: usize,
 }
 
@@ -113,7 +116,7 @@ impl PipelineTraining<'_> {
             downsampling,
         } = self.latents;
         let (range, most) = (wake_nn::check_range, (downsampling * downsampling) as f64);
-        range("downsampling", downsampling as f64, 1.0, 64.0).map_err(Error::Value)?;
+        range("downsampling", downsampling as f64, 1.0, MOST_PIXELS).map_err(Error::Value)?;
         range("latents", channels as f64, 1.0, most).map_err(Error::Value)?;
         let [rows, columns] = self.pairs.source().size();
         let multiple = 4 * downsampling;
@@ -162,7 +165,8 @@ impl PipelineTraining<'_> {
             self.images(done)
         })?;
         let (device, count) = (options.device(), images.len() as u64);
-        if !out.join(VAE).exists() {
+        // The configuration is written last.
+        if !out.join(VAE_CONFIG).exists() {
             let config = self.latents.autoencoder();
             let autoencoder = counted("autoencoder", count, progress, |done| {
                 images.fit(&config, &device, |n| done(n as u64))

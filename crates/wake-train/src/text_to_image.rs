@@ -210,15 +210,13 @@ impl Task<TextToImage> for TextToImageTask<'_> {
         let count = self.schedule.steps();
         let steps = positions.clone().map(|p| step_of(random, p, count));
         let steps: Vec<usize> = steps.collect();
-        let told = positions.clone().zip(&indices).flat_map(|(p, &i)| {
+        let told = positions.clone().zip(&indices).map(|(p, &i)| {
             match is_told(random, streams::LEFT_OUT, p) {
                 true => &self.set.prompts[i],
                 false => &self.set.empty,
             }
         });
-        let told: Vec<i32> = told.copied().collect();
-        let shape = [indices.len(), told.len() / indices.len().max(1)];
-        let ids: Tensor<2, Int> = Tensor::from_data(TensorData::new(told, shape), device);
+        let ids = token_batch(told, device);
         let sources: Vec<NoiseSource> = positions.clone().map(|p| noise_of(self.seed, p)).collect();
         let noise = normal_batch(&sources, FINE_TUNE_STREAM, self.set.shape, device);
         let clean = batch(&self.set.latents, self.set.shape, &indices, device);
@@ -233,6 +231,20 @@ impl Task<TextToImage> for TextToImageTask<'_> {
         let terms = vec![("velocity", number(&loss))];
         (loss, terms)
     }
+}
+
+/// Prompts of the same number of tokens as one tensor, `[prompts, tokens]`.
+pub(crate) fn token_batch<'a>(
+    prompts: impl Iterator<Item = &'a Vec<i32>>,
+    device: &Device,
+) -> Tensor<2, Int> {
+    let (mut ids, mut count) = (Vec::new(), 0);
+    for prompt in prompts {
+        ids.extend_from_slice(prompt);
+        count += 1;
+    }
+    let shape = [count, ids.len() / count.max(1)];
+    Tensor::from_data(TensorData::new(ids, shape), device)
 }
 
 /// Diffusion step of the example at a position: any of `count` for one half, one of the noisiest tenth for the other.

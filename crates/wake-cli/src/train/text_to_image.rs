@@ -42,10 +42,10 @@ pub(crate) struct Options {
     #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(u32).range(1..))]
     stop_after: Option<u32>,
     /// Pixels per latent pixel along each axis
-    #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=64))]
+    #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=16))]
     downsampling: u16,
     /// Channels of the latents, at most the square of --downsampling
-    #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u16).range(1..=4096))]
+    #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u16).range(1..=256))]
     latents: u16,
     #[command(flatten)]
     pace: Pace,
