@@ -30,6 +30,7 @@ from safetensors.torch import load_file, save_file
 from transformers import CLIPTextConfig, CLIPTextModel, CLIPTokenizer
 
 WARMUP, DECAY, LEFT_OUT, EAGER, HELD_OUT = 100, 0.999, 0.1, 3, 64
+BLIND, MOST_BLIND, MEAN, FIRST = 0.3, 19_200, 0.03, 4.0
 VAE = "vae/diffusion_pytorch_model.safetensors"
 UNET = "unet/diffusion_pytorch_model.safetensors"
 TEXT = "text_encoder/model.safetensors"
@@ -61,6 +62,7 @@ class Learning:
         device = self.weights[0].device
         self.rate = torch.zeros((), device=device)
         self.keep = torch.zeros((), device=device)
+        self.part = torch.zeros((), device=device)
         self.value = torch.zeros((), device=device)
         self.optimizer = torch.optim.AdamW(
             self.weights, lr=self.rate, betas=(0.9, 0.99), eps=1e-8, weight_decay=1e-2, capturable=device.type == "cuda"
@@ -75,11 +77,12 @@ class Learning:
             part = min((step - WARMUP) / max(self.steps - WARMUP, 1), 1)
             rate = self.peak * (0.1 + 0.45 * (1 + math.cos(math.pi * part)))
         self.rate.fill_(rate)
+        self.part.fill_(step / self.steps)
         self.keep.fill_(min(DECAY, 1 - (2 + step) ** (-2 / 3)))
 
     def compute(self):
         self.optimizer.zero_grad(set_to_none=False)
-        loss = self.loss()
+        loss = self.loss(self.part)
         loss.backward()
         torch.nn.utils.clip_grad_norm_(self.weights, 1.0)
         self.optimizer.step()
@@ -180,19 +183,28 @@ def train(options, device):
         signal, spread = level.sqrt(), (1 - level).sqrt()
         return signal * clean + spread * noise, signal * noise - spread * clean
 
-    def loss():
+    def loss(part):
+        """Loss of a batch after a part of the training. The first examples have no noise and no signal, the prompt alone."""
         which = torch.randint(count, (options.batch,), device=device)
         left_out = torch.rand(options.batch, device=device) < LEFT_OUT
         told = ids[torch.where(left_out, count + HELD_OUT, which)]
         t = torch.randint(1000, (options.batch,), device=device)
         if not options.uniform:
             t[1::2] = 900 + t[1::2] // 10
+        seen = torch.ones_like(part) if options.uniform else (part >= blind).float()
+        t = torch.where(seen > 0, t, 999)
         clean = latents[which].float()
         noise = torch.randn_like(clean)
         sample, target = noised(clean, noise, kept[t][:, None, None, None])
         with torch.autocast(device.type, torch.bfloat16, options.bf16, cache_enabled=False):
-            found = unet(sample, t, text(told).last_hidden_state).sample
-        return (found.float() - target).square().mean()
+            found = unet(sample * seen, t, text(told).last_hidden_state).sample
+        error = found.float() - target
+        if options.uniform:
+            return error.square().mean()
+        mean = error.mean(dim=(2, 3), keepdim=True)
+        varying = (error - mean).square()
+        first = varying[:, 0].mean() * (FIRST - 1) / error.shape[1]
+        return varying.mean() + first + MEAN * mean.square().mean()
 
     def unexplained(prompts):
         """Share of the variance of held-out latents that the averaged model leaves open, in steps of little and much noise."""
@@ -209,6 +221,7 @@ def train(options, device):
         return ", ".join(shares)
 
     marks = [int(mark) for mark in options.samples.split(",")]
+    blind = min(BLIND, MOST_BLIND / marks[-1])
     learning = Learning([text, unet], loss, marks[-1] // options.batch, options)
     checkpoint = options.model / "torch.pt"
     if checkpoint.exists():
@@ -260,7 +273,7 @@ def main():
     parser.add_argument("--batch", type=int, default=32)
     parser.add_argument("--samples", default="80000,250000,500000,1000000", help="numbers of images seen that are written")
     parser.add_argument("--rate", type=float, default=5e-4)
-    parser.add_argument("--uniform", action="store_true", help="draw all diffusion steps alike, not half of them from the noisiest tenth")
+    parser.add_argument("--uniform", action="store_true", help="train in the usual way: all steps are drawn alike, all errors count alike")
     parser.add_argument("--random-text", action="store_true", help="begin with random weights of the text encoder as well")
     parser.add_argument("--seconds", type=float, default=math.inf, help="stop after this time, to go on later")
     parser.add_argument("--bf16", action="store_true", help="compute losses in bfloat16; weights keep 32 bits")

@@ -30,16 +30,15 @@ impl PromptReader {
         }
     }
 
-    /// Statements of prompts, from the state of their last token.
+    /// Statements of prompts, from the mean of the states of their tokens.
     ///
     /// # Shapes
     ///
     /// `ids`: `[prompts, tokens]`; result: `[prompts, 3 · QUANTITIES]`, see [`wake_ldm::conditioning::statement`]
     fn statements(&self, ids: Tensor<2, Int>) -> Tensor<2> {
         let states = self.text_encoder.last_hidden_state(ids);
-        let [prompts, tokens, width] = states.dims();
-        let last = states.narrow(1, tokens - 1, 1);
-        self.values.forward(last.reshape([prompts, width]))
+        let mean: Tensor<2> = states.mean_dim(1).squeeze_dim(1);
+        self.values.forward(mean)
     }
 }
 
@@ -48,10 +47,9 @@ impl PromptReader {
 /// Stable Diffusion's text encoder knows numbers and directions before the U-Net is trained. A random one learns them from the
 /// loss of the U-Net far more slowly than from the values themselves.
 ///
-/// # References
-///
-/// Radford et al. (2021), "Learning Transferable Visual Models From Natural Language Supervision", section 2.4 (the state of
-/// the last token).
+/// The values are read from the mean over all tokens, padding included, because that is what the cross-attention of a U-Net with
+/// random weights sees: each token gets the same attention. If only the last of 77 tokens knew the values, they would be a
+/// hundredth of what the U-Net sees, and it would learn to ignore prompts.
 #[derive(Debug)]
 pub(crate) struct ReadingTask<'a> {
     /// Prompts as tokens, at least one.

@@ -36,7 +36,7 @@ const DEFAULTS: StageDefaults = StageDefaults {
     rate: 5e-4,
 };
 const READER_DEFAULTS: StageDefaults = StageDefaults {
-    steps: 4000,
+    steps: 2500,
     ..DEFAULTS
 };
 /// Files written by the stages.
@@ -168,7 +168,7 @@ impl PipelineTraining<'_> {
         // The configuration is written last.
         if !out.join(VAE_CONFIG).exists() {
             let config = self.latents.autoencoder();
-            let autoencoder = counted("autoencoder", count, progress, |done| {
+            let autoencoder = counted("autoencoder", 2 * count, progress, |done| {
                 images.fit(&config, &device, |n| done(n as u64))
             });
             let (vae, precision) = (out.join("vae"), Precision::F16);
@@ -199,16 +199,14 @@ impl PipelineTraining<'_> {
             text_encoder,
             unet: self.latents.unet().init(device),
         };
-        let run = Run::of(
-            MODEL,
-            &model,
-            init,
-            options.run(&DEFAULTS, identity),
-            learning,
-        )?;
+        let constants = options.run(&DEFAULTS, identity);
+        let steps = options.steps(&DEFAULTS);
+        let blind = TextToImageTask::blind_of((steps * constants.batch) as u64);
+        let run = Run::of(MODEL, &model, init, constants, learning)?;
         let task = TextToImageTask {
             set: &set,
             schedule: schedule(&scheduler)?,
+            blind,
             seed: options.seed,
         };
         let show = |run: &Run<TextToImage>| -> Result<()> {
@@ -219,7 +217,6 @@ impl PipelineTraining<'_> {
             Ok(pipeline.save(out, Precision::F16)?)
         };
         let results = ["model_index.json", SHEET];
-        let steps = options.steps(&DEFAULTS);
         let steps = self.stop_after.map_or(steps, |last| last.min(steps));
         let stage = self.stage(MODEL, steps, &results, &folder);
         stage.train(&mut folder, run, &task, progress, show)

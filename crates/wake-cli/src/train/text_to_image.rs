@@ -25,8 +25,8 @@ pub(crate) const DEFAULTS: &[(&str, &str)] = &[
 
 /// Train a small text-to-image model in Stable Diffusion's layout from scratch, on images and prompts.
 ///
-/// Fits the autoencoder in closed form, trains the text encoder alone, then text encoder and U-Net together. `wake generate --weights`, `wake evaluate
-/// pipeline --weights` and `wake train fine-tune --weights` read the model.
+/// Fits the autoencoder in closed form, trains the text encoder alone, then text encoder and U-Net together. `wake generate
+/// --weights`, `wake evaluate pipeline --weights` and `wake train fine-tune --weights` read the model.
 #[derive(Args)]
 pub(crate) struct Options {
     /// Folder of a data set of `wake dataset` [default: simulate pairs first]
@@ -36,7 +36,7 @@ pub(crate) struct Options {
     #[arg(long, default_value_t = 4000, value_parser = clap::value_parser!(u64).range(8..=10_000_000))]
     count: u64,
     /// Training steps of the text encoder alone, on the values that prompts state; --steps is for text encoder and U-Net
-    #[arg(long, default_value_t = 4000, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, default_value_t = 2500, value_parser = clap::value_parser!(u32).range(1..))]
     text_steps: u32,
     /// Stop after this many of --steps; continue with --resume
     #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(u32).range(1..))]

@@ -299,7 +299,7 @@ pub(super) fn noised(
 }
 
 /// A number for each image, `[numbers, 1, 1, 1]`.
-fn each(values: Vec<f64>, device: &Device) -> Tensor<4> {
+pub(super) fn each(values: Vec<f64>, device: &Device) -> Tensor<4> {
     let numbers: Vec<f32> = values.into_iter().map(|x| x as f32).collect();
     let count = numbers.len();
     Tensor::from_data(TensorData::new(numbers, [count, 1, 1, 1]), device)

@@ -110,13 +110,69 @@ fn half_of_the_steps_are_noisy() {
     }
 }
 
-/// Two latents differ only in sign. With ᾱ = 0.03 and 0.0009 their mean is at most 0.17, hardly distinguishable from the noise's
-/// deviation of 0.09, so only the prompt identifies them. With the wrong prompt the loss is larger by up to 4ᾱ.
+/// The first examples have no sample, only the image as their target; later ones have both.
+#[test]
+fn the_first_examples_are_drawn_from_the_prompt_alone() {
+    let device = Device::flex();
+    let set = PromptedLatents {
+        shape: [1, 2, 2],
+        latents: (0..8).map(|n| f16::from_f32(n as f32 - 3.5)).collect(),
+        prompts: vec![vec![1]; 2],
+        empty: vec![0],
+    };
+    let curve = BetaCurve::ScaledLinear(0.01, 0.2);
+    let schedule = NoiseSchedule::new(&curve, 20, TerminalSnr::Zero).unwrap();
+    let task = TextToImageTask {
+        set: &set,
+        schedule: &schedule,
+        blind: 3,
+        seed: 5,
+    };
+    let order = [0, 1, 1, 0];
+    let noised = task.noised(&(0..4), &order, &device);
+    let timesteps: Vec<f32> = noised.timesteps.into_data().iter::<f32>().collect();
+    assert_eq!(timesteps[..3], [19.0; 3]);
+    let clean = batch(&set.latents, set.shape, &order, &device);
+    let largest = |x: Tensor<4>| -> Vec<f32> {
+        let of_image = x.abs().reshape([4, 4]).max_dim(1);
+        of_image.into_data().iter::<f32>().collect()
+    };
+    let sample = largest(noised.sample);
+    assert_eq!(sample[..3], [0.0; 3]);
+    assert!(sample[3] > 0.0);
+    assert_eq!(largest(noised.target + clean)[..3], [0.0; 3]);
+}
+
+/// Errors of 2 in two channels, with one sign all over the image, or with the sign of a chessboard in one channel.
+#[test]
+fn brightness_weighs_little_and_the_first_channel_much() {
+    let device = Device::flex();
+    let loss = |error: [f32; 8]| {
+        let error = Tensor::from_data(TensorData::new(error.to_vec(), [1, 2, 2, 2]), &device);
+        number(&weighted_square(error))
+    };
+    let (even, board) = ([2.0; 4], [2.0, -2.0, -2.0, 2.0]);
+    let of = |first: [f32; 4], second: [f32; 4]| [first, second].concat().try_into().unwrap();
+    for (error, weight) in [
+        (of(even, even), MEAN),
+        (of(board, [0.0; 4]), 0.5 * FIRST),
+        (of([0.0; 4], board), 0.5),
+    ] {
+        let rounding = 4.0 * f64::from(f32::EPSILON);
+        assert!((loss(error) / (4.0 * weight) - 1.0).abs() < rounding);
+    }
+}
+
+/// One latent image is bright on the left and dark on the right, the other the reverse. With ᾱ = 0.03 and 0.0009 their sides are
+/// at most 0.17 off zero, hardly distinguishable from the noise's deviation of 0.09, so only the prompt identifies them.
 #[test]
 fn the_prompt_says_which_image() {
     let device = Device::flex();
     let length = 2 * 8 * 8;
-    let latents = (0..2 * length).map(|n| f16::from_f32(if n < length { 1.0 } else { -1.0 }));
+    let latents = (0..2 * length).map(|n| {
+        let (first, left) = (n < length, n % 8 < 4);
+        f16::from_f32(if first == left { 1.0 } else { -1.0 })
+    });
     let set = |prompts: [i32; 2]| PromptedLatents {
         shape: [2, 8, 8],
         latents: latents.clone().collect(),
@@ -150,6 +206,7 @@ fn the_prompt_says_which_image() {
     let task = |set| TextToImageTask {
         set,
         schedule: &schedule,
+        blind: TextToImageTask::blind_of(8 * steps as u64),
         seed: 3,
     };
     for _ in 0..steps {

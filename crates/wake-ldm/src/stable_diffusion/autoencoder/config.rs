@@ -39,7 +39,7 @@ pub struct AutoencoderKlConfig {
     /// Whether a 1 × 1 convolution follows the encoder.
     #[config(default = true)]
     pub quant_conv: bool,
-    /// Whether a 1 × 1 convolution precedes the decoder.
+    /// Whether a convolution precedes the decoder: 1 × 1, and 3 × 3 in a linear model, which has no other decoder.
     #[config(default = true)]
     pub post_quant_conv: bool,
     /// Factor on latents before diffusion, for variance 1.
@@ -88,7 +88,7 @@ impl AutoencoderKlConfig {
             .with_patch_size(side)
     }
 
-    /// True for a model without levels: two convolutions of 1 × 1 pixels between squares of pixels and latents.
+    /// True for a model without levels: two convolutions between squares of pixels and latents.
     pub(super) fn is_linear(&self) -> bool {
         self.block_out_channels.is_empty()
     }

@@ -15,7 +15,7 @@ use burn::tensor::{DType, Device, Tensor};
 use blocks::{Decoder, Encoder};
 use wake_nn::Result;
 use wake_nn::cast_to;
-use wake_nn::conv::{conv1x1, convolve};
+use wake_nn::conv::{conv1x1, conv3x3, convolve};
 use wake_nn::patch::{depth_to_space, space_to_depth};
 use wake_nn::weights::{Layout, load};
 
@@ -32,8 +32,8 @@ pub use tiling::Tiling;
 ///
 /// Images lie in [−1, 1]. `encode` and `decode` work on z; [`to_latents`](Self::to_latents) and
 /// [`from_latents`](Self::from_latents) convert to and from the latents of the diffusion model.
-/// Without levels in its configuration, the network is linear: squares of pixels become latents and pixels again through the
-/// two convolutions of 1 × 1 pixels, see [`AutoencoderKlConfig::fit`].
+/// Without levels in its configuration, the network is linear: squares of pixels become latents through one convolution, of 1 × 1
+/// latent pixels, and pixels again through another, of 3 × 3, see [`AutoencoderKlConfig::fit`].
 ///
 /// # References
 ///
@@ -70,9 +70,10 @@ impl AutoencoderKlConfig {
             quant_conv: self
                 .quant_conv
                 .then(|| conv1x1(encoded, 2 * latent, device)),
-            post_quant_conv: self
-                .post_quant_conv
-                .then(|| conv1x1(latent, decoder_input, device)),
+            post_quant_conv: self.post_quant_conv.then(|| match self.is_linear() {
+                true => conv3x3(latent, decoder_input, device),
+                false => conv1x1(latent, decoder_input, device),
+            }),
             decoder: (!self.is_linear()).then(|| Decoder::new(self, device)),
             config: self.clone(),
         }
