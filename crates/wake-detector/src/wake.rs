@@ -34,6 +34,12 @@ impl Wake {
         [self.tip[0] + along * right, self.tip[1] + along * down]
     }
 
+    /// The turn from this axis to that of another wake \[deg\], −180 to 180.
+    #[must_use]
+    pub fn turn_to(&self, other: &Self) -> f32 {
+        turn(self.axis_deg, other.axis_deg)
+    }
+
     /// Corners (column, row) of the box around the visible wake, as wide as the distance of the outer edges at half the length,
     /// at least 16 pixels: left and right of the tip, then right and left of the end.
     #[must_use]

@@ -67,7 +67,7 @@ impl Seen {
 
     /// Whether another detection with a lower score is the same wake.
     fn is_again(&self, other: &Self) -> bool {
-        let turn = turn(&self.wake, &other.wake);
+        let turn = self.wake.turn_to(&other.wake).abs();
         match (&self.echo, &other.echo) {
             (Some(a), Some(b)) => {
                 let away = (a.line - b.line).hypot(a.pixel - b.pixel);
@@ -91,15 +91,10 @@ impl Seen {
 
 /// Drops the measured length of a detection if the refined line is turned too far from the axis of that measurement.
 fn measured_along(mut detection: Detection, line: &Wake) -> Detection {
-    if turn(&detection.wake, line) > MEASURED {
+    if detection.wake.turn_to(line).abs() > MEASURED {
         detection.extent = None;
     }
     detection
-}
-
-/// Angle between the axes of two wakes \[degrees\].
-fn turn(a: &Wake, b: &Wake) -> f32 {
-    ((b.axis_deg - a.axis_deg + 180.0).rem_euclid(360.0) - 180.0).abs()
 }
 
 /// Places a detected wake on its refined line, starting at the ship's stern if the echo gives it; the length changes by the

@@ -4,10 +4,10 @@ use std::ops::Range;
 
 use burn::module::Module;
 use burn::nn::{Linear, LinearConfig};
-use burn::tensor::{Device, Int, Tensor};
+use burn::tensor::{Device, Int, Tensor, TensorData};
 
 use super::run::{Task, Terms};
-use super::tasks::{examples, statement_loss};
+use super::tasks::examples;
 use super::text_to_image::token_batch;
 use crate::error::Result;
 use wake_ldm::conditioning::QUANTITIES;
@@ -42,19 +42,20 @@ impl PromptReader {
     }
 }
 
-/// Task of the reader: squared errors of each quantity, and of whether it is stated.
+/// Task of the reader: squared errors of standardised statements.
 ///
 /// Stable Diffusion's text encoder knows numbers and directions before the U-Net is trained. A random one learns them from the
 /// loss of the U-Net far more slowly than from the values themselves.
 ///
 /// The values are read from the mean over all tokens, padding included, because that is what the cross-attention of a U-Net with
 /// random weights sees: each token gets the same attention. If only the last of 77 tokens knew the values, they would be a
-/// hundredth of what the U-Net sees, and it would learn to ignore prompts.
+/// hundredth of what the U-Net sees, and it would learn to ignore prompts. They are standardised over the prompts, because a range
+/// that is narrow among all scenes, such as that of the incidence, would hardly count.
 #[derive(Debug)]
 pub(crate) struct ReadingTask<'a> {
     /// Prompts as tokens, at least one.
     pub prompts: &'a [Vec<i32>],
-    /// Their statements.
+    /// Their statements, as [`standardised`] makes them.
     pub statements: &'a [Vec<f32>],
     /// Seed of the order.
     pub seed: u64,
@@ -76,8 +77,30 @@ impl Task<PromptReader> for ReadingTask<'_> {
         let indices = examples(self.seed, positions.clone(), self.prompts.len());
         let ids = token_batch(indices.iter().map(|&i| &self.prompts[i]), device);
         let said = indices.iter().flat_map(|&i| self.statements[i].clone());
-        statement_loss(model.statements(ids), said.collect())
+        let said = TensorData::new(said.collect(), [indices.len(), 3 * QUANTITIES]);
+        let error = model.statements(ids) - Tensor::from_data(said, device);
+        (error.square().mean(), Vec::new())
     }
+}
+
+/// Statements with mean 0 and variance 1 of each of their numbers; 0 for a number that is the same in all.
+pub(crate) fn standardised(statements: &[Vec<f32>]) -> Vec<Vec<f32>> {
+    let mut found = statements.to_vec();
+    for n in 0..3 * QUANTITIES {
+        let numbers = || statements.iter().map(|statement| f64::from(statement[n]));
+        let mean = numbers().sum::<f64>() / statements.len() as f64;
+        let variance = numbers().map(|x| (x - mean).powi(2)).sum::<f64>();
+        let deviation = (variance / statements.len() as f64).sqrt();
+        let scale = if deviation > 1e-6 {
+            deviation.recip()
+        } else {
+            0.0
+        };
+        for (statement, x) in found.iter_mut().zip(numbers()) {
+            statement[n] = ((x - mean) * scale) as f32;
+        }
+    }
+    found
 }
 
 #[cfg(all(test, feature = "flex"))]
@@ -86,7 +109,7 @@ mod tests {
     use super::*;
     use crate::{LrSchedule, Run, RunOptions, TrainerOptions};
     use serde_json::Value;
-    use wake_ldm::conditioning::{said, statement};
+    use wake_ldm::conditioning::statement;
     use wake_text::PartialScene;
 
     /// Two tokens state sixteen directions: the first token the quadrant, the second one the part of it. After training, each is
@@ -104,6 +127,7 @@ mod tests {
                 })
             })
             .collect();
+        let statements = standardised(&statements);
         let config = ClipTextConfig::new()
             .with_vocab_size(10)
             .with_hidden_size(16)
@@ -144,11 +168,30 @@ mod tests {
             .iter::<f32>()
             .collect();
         for (n, read) in read.chunks(3 * QUANTITIES).enumerate() {
-            let read = said(read);
-            let off = read.ship_heading.unwrap() - direction(n);
+            // Of the ship's heading, the third quantity, sine and cosine have the same deviation.
+            let heading = read[7].atan2(read[8]).to_degrees();
+            let off = f64::from(heading) - direction(n);
             let off = (off + 180.0).rem_euclid(360.0) - 180.0;
             assert!(off.abs() < 11.25, "{n}: {read:?}");
-            assert_eq!(read.wind_toward, None);
+        }
+    }
+
+    /// The numbers of narrow ranges count as much as others, those that are always the same not at all.
+    #[test]
+    fn statements_are_standardised() {
+        let incidences: Vec<Vec<f32>> = [20.0, 21.0, 22.0]
+            .map(|incidence| {
+                statement(&PartialScene {
+                    incidence: Some(incidence),
+                    ..PartialScene::default()
+                })
+            })
+            .to_vec();
+        let found = standardised(&incidences);
+        let (last, flag) = (3 * QUANTITIES - 2, 3 * QUANTITIES - 3);
+        for (found, expected) in found.iter().zip([-1.5f32.sqrt(), 0.0, 1.5f32.sqrt()]) {
+            assert!((found[last] - expected).abs() < 1e-5);
+            assert!(found[flag].abs() < 1e-6 && found[0].abs() < 1e-6);
         }
     }
 }

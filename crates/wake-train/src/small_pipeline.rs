@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::folder::RunFolder;
 use super::pairs::TrainingPairs;
 use super::progress::{Progress, counted};
-use super::prompt_reading::{PromptReader, ReadingTask};
+use super::prompt_reading::{PromptReader, ReadingTask, standardised};
 use super::run::Run;
 use super::sheet::write_sheet;
 use super::stage::Stage;
@@ -240,7 +240,7 @@ impl PipelineTraining<'_> {
         let run = Run::of(READER, &text().to_json(), init, constants, learning)?;
         let task = ReadingTask {
             prompts: images.prompts(),
-            statements: images.statements(),
+            statements: &standardised(images.statements()),
             seed: options.seed,
         };
         let show = |run: &Run<PromptReader>| -> Result<()> {

@@ -4,6 +4,7 @@ use super::noise::Noise;
 use super::parameter::Parameter;
 use super::value::Value;
 use crate::error::Result;
+use crate::measure::angle_between;
 use crate::raster::Field;
 use crate::scene::Scene;
 use rayon::prelude::*;
@@ -55,7 +56,7 @@ impl Texture {
     /// Distance to the wind of a scene: relative change of the speed, and change of the direction \[deg\].
     fn to(&self, scene: &Scene) -> [f64; 2] {
         let [speed, toward] = wind_of(scene);
-        let turned = (toward - self.wind[1] + 180.0).rem_euclid(360.0) - 180.0;
+        let turned = angle_between(toward, self.wind[1]);
         [speed / self.wind[0] - 1.0, turned]
     }
 

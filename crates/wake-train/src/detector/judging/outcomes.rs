@@ -5,6 +5,7 @@ use wake_dataset::{Pair, Source};
 use wake_detector::score::{Judged, Rule, verdicts};
 use wake_detector::{Detection, Detector, GreyImage};
 use wake_physics::Scene;
+use wake_physics::measure::angle_between;
 
 use super::simulated::known;
 use crate::detector::Sample;
@@ -130,10 +131,9 @@ pub fn outcomes(images: &[Judged], found: &[Vec<Detection>]) -> Vec<DetectionOut
         let label = verdict
             .label
             .map(|label| &images[verdict.image].labels[label]);
-        let turn = label.filter(|label| !label.ambiguous).map(|label| {
-            let turn = f64::from(detection.wake.axis_deg) - label.ray.axis_deg;
-            (turn + 180.0).rem_euclid(360.0) - 180.0
-        });
+        let turn = label
+            .filter(|label| !label.ambiguous)
+            .map(|label| angle_between(f64::from(detection.wake.axis_deg), label.ray.axis_deg));
         DetectionOutcome {
             image: verdict.image,
             detection,
