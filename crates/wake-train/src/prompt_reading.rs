@@ -176,6 +176,25 @@ mod tests {
         }
     }
 
+    /// The statement of a prompt is the mean of what each token states.
+    #[test]
+    fn all_tokens_state_the_values() {
+        let device = Device::flex();
+        let config = ClipTextConfig::new()
+            .with_vocab_size(10)
+            .with_hidden_size(16)
+            .with_intermediate_size(32)
+            .with_layers(1)
+            .with_heads(2);
+        let reader = PromptReader::new(&config, &device);
+        let ids = token_batch([vec![0, 3, 7, 9]].iter(), &device);
+        let states = reader.text_encoder.last_hidden_state(ids.clone());
+        let of_token = |n: usize| reader.values.forward(states.clone().narrow(1, n, 1));
+        let mean = Tensor::cat((0..4).map(of_token).collect(), 1).mean_dim(1);
+        let off = mean.reshape([1, -1]) - reader.statements(ids);
+        assert!(off.abs().max().into_scalar::<f32>() < 1e-5);
+    }
+
     /// The numbers of narrow ranges count as much as others, those that are always the same not at all.
     #[test]
     fn statements_are_standardised() {

@@ -39,7 +39,7 @@ pub struct AutoencoderKlConfig {
     /// Whether a 1 × 1 convolution follows the encoder.
     #[config(default = true)]
     pub quant_conv: bool,
-    /// Whether a convolution precedes the decoder: 1 × 1, and 3 × 3 in a linear model, which has no other decoder.
+    /// True for a convolution before the decoder, of 1 × 1 latent pixels. In a linear model it has 3 × 3 and is the whole decoder.
     #[config(default = true)]
     pub post_quant_conv: bool,
     /// Factor on latents before diffusion, for variance 1.
